@@ -147,6 +147,27 @@ TEST_F(CsvFileTest, NumbersReadBackToTheSameDouble) {
   }
 }
 
+TEST_F(CsvFileTest, ANumberThatComesAgainHasTheSameText) {
+  std::mt19937_64 random(2);
+  std::vector<double> values(600);  // more than there are texts that are kept
+  for (double& value : values) value = to_double(random() & 0xbfffffffffffffff);
+  values.push_back(0.0);
+  values.push_back(-0.0);
+  CsvFile file(path_, "value,again");
+  std::string expected = "value,again\n";
+  for (int i = 0; i < 20000; ++i) {
+    const double value = values[random() % values.size()];
+    std::array<char, 32> text;
+    const std::string plain(text.data(), std::to_chars(text.begin(), text.end(), value).ptr);
+    file.add(value);
+    file.add(value);
+    file.end_row();
+    expected += plain + ',' + plain + '\n';
+  }
+  file.flush();
+  EXPECT_EQ(read_bytes(path_), expected);
+}
+
 TEST_F(CsvFileTest, NonFiniteNumbersAreWrittenAsWords) {
   CsvFile file(path_, "h");
   file.add(std::numeric_limits<double>::infinity());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <cstdint>
 #include <filesystem>
@@ -24,7 +25,9 @@ class CsvFile {
   void add(std::string_view text);  ///< quoted if it has a comma, a quote or a line break
   template <class Integer, std::enable_if_t<std::is_integral_v<Integer>, int> = 0>
   void add(Integer value) {
-    add_number(value);
+    char* const begin = begin_field(kLongestInteger);
+    used_ +=
+        static_cast<std::size_t>(std::to_chars(begin, begin + kLongestInteger, value).ptr - begin);
   }
   /// Each element of an array or vector is a field.
   template <class Vector>
@@ -43,17 +46,17 @@ class CsvFile {
 
  private:
   /// Makes room for a field of `bytes` bytes and its separator, and writes the separator.
-  char* begin_field(std::size_t bytes);
-  template <class Number>
-  void add_number(Number value) {
-    char* const begin = begin_field(kLongestNumber);
-    used_ +=
-        static_cast<std::size_t>(std::to_chars(begin, begin + kLongestNumber, value).ptr - begin);
+  char* begin_field(std::size_t bytes) {
+    if (buffer_.size() < used_ + bytes + 2)  // 2: a comma before it, a line break after it
+      buffer_.resize(std::max(2 * buffer_.size(), used_ + bytes + 2));
+    if (row_begun_) buffer_[used_++] = ',';
+    row_begun_ = true;
+    return buffer_.data() + used_;
   }
   void cut_back_to_whole_rows(std::size_t written);
   void forget(std::size_t bytes);
 
-  static constexpr std::size_t kLongestNumber = 32;  // that of a double has 24 characters
+  static constexpr std::size_t kLongestInteger = 20;  // characters, of a negative one of 64 bits
 
   const std::filesystem::path path_;
   int descriptor_ = -1;
