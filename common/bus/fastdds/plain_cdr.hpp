@@ -36,23 +36,16 @@ If<Message, ControllerState> visit(Coder& coder, Message& message) {
 }
 template <class Coder, class Message>
 If<Message, PlantState> visit(Coder& coder, Message& message) {
-  coder(message.p_WQ_m());
-  coder(message.v_WQ_m_s());
-  coder(message.q_WB());
-  coder(message.w_WB_B_rad_s());
-  coder(message.p_WL_m());
-  coder(message.v_WL_m_s());
-  coder(message.alpha_rad());
-  coder(message.beta_rad());
-  coder(message.alpha_dot_rad_s());
-  coder(message.beta_dot_rad_s());
+  coder.doubles(message.p_WQ_m(), message.v_WQ_m_s(), message.q_WB(), message.w_WB_B_rad_s(),
+                message.p_WL_m(), message.v_WL_m_s(), message.alpha_rad(), message.beta_rad(),
+                message.alpha_dot_rad_s(), message.beta_dot_rad_s());
   coder(message.signals(), MOST_NUMBERS);
 }
 template <class Coder, class Message>
 If<Message, VehicleState> visit(Coder& coder, Message& message) {
   coder(message.vehicle_id());
   visit(coder, message.measured());
-  coder(message.f_Q_W_n());
+  coder.doubles(message.f_Q_W_n());
   coder(message.force_origin());
   coder(message.controller_name());
   visit(coder, message.controller());
@@ -68,16 +61,13 @@ template <class Coder, class Message>
 If<Message, Reference> visit(Coder& coder, Message& message) {
   coder(message.stage_index());
   coder(message.stage_name());
-  coder(message.position_m());
-  coder(message.velocity_m_s());
-  coder(message.acceleration_m_s2());
-  coder(message.jerk_m_s3());
-  coder(message.snap_m_s4());
+  coder.doubles(message.position_m(), message.velocity_m_s(), message.acceleration_m_s2(),
+                message.jerk_m_s3(), message.snap_m_s4());
 }
 template <class Coder, class Message>
 If<Message, ControlCommand> visit(Coder& coder, Message& message) {
   coder(message.vehicle_id());
-  coder(message.f_Q_W_n());
+  coder.doubles(message.f_Q_W_n());
   visit(coder, message.reference());
   visit(coder, message.controller());
   coder(message.mission());
@@ -99,7 +89,7 @@ If<Message, RecordEntry> visit(Coder& coder, Message& message) {
   coder(message.kind());
   visit(coder, message.truth());
   coder(message.measured(), 1);
-  coder(message.f_Q_W_n());
+  coder.doubles(message.f_Q_W_n());
   coder(message.answered_step());
   coder(message.client_name());
   visit(coder, message.answer());
@@ -125,6 +115,11 @@ constexpr std::size_t calc_padding(std::size_t offset, std::size_t alignment) {
   return (0 - offset) & (alignment - 1);
 }
 
+template <class Type>
+inline constexpr bool kIsDoubles = std::is_same_v<Type, double>;
+template <std::size_t kCount>
+inline constexpr bool kIsDoubles<std::array<double, kCount>> = true;
+
 /// Writes fields as long as they fit into `room` bytes, and counts the bytes of all.
 class Writer {
  public:
@@ -140,9 +135,13 @@ class Writer {
     static_assert(sizeof value == 4, "an enumeration of the contract has four bytes");
     write(&value, 4, 4);
   }
-  template <std::size_t kCount>
-  void operator()(const std::array<double, kCount>& numbers) {
-    write(numbers.data(), sizeof numbers, 8);
+  /// Numbers and arrays of them: there is no padding but before the first.
+  template <class... Doubles>
+  void doubles(const Doubles&... fields) {
+    static_assert((kIsDoubles<Doubles> && ...));
+    std::uint8_t* place = make_room((sizeof fields + ...), 8);
+    if (!place) return;
+    ((std::memcpy(place, &fields, sizeof fields), place += sizeof fields), ...);
   }
   template <std::size_t kMost>
   void operator()(const FixedString<kMost>& text) {
@@ -162,13 +161,15 @@ class Writer {
 
  private:
   void write(const void* from, std::size_t bytes, std::size_t alignment) {
-    const std::size_t padding = calc_padding(size_, alignment);
-    const std::size_t end = size_ + padding + bytes;
-    if (end <= room_) {
-      if (padding != 0) std::memset(data_ + size_, 0, padding);
-      std::memcpy(data_ + size_ + padding, from, bytes);
-    }
-    size_ = end;
+    if (std::uint8_t* const place = make_room(bytes, alignment)) std::memcpy(place, from, bytes);
+  }
+  /// The place of the next `bytes` bytes; null if they do not fit.
+  std::uint8_t* make_room(std::size_t bytes, std::size_t alignment) {
+    const std::size_t begin = size_, padding = calc_padding(begin, alignment);
+    size_ += padding + bytes;
+    if (size_ > room_) return nullptr;
+    if (padding != 0) std::memset(data_ + begin, 0, padding);
+    return data_ + begin + padding;
   }
 
   std::uint8_t* const data_;
@@ -197,9 +198,12 @@ class Reader {
   std::enable_if_t<std::is_enum_v<Enum>> operator()(Enum& value) {
     read(&value, 4, 4);
   }
-  template <std::size_t kCount>
-  void operator()(std::array<double, kCount>& numbers) {
-    read(numbers.data(), sizeof numbers, 8);
+  template <class... Doubles>
+  void doubles(Doubles&... fields) {
+    static_assert((kIsDoubles<Doubles> && ...));
+    const std::uint8_t* place = take((sizeof fields + ...), 8);
+    if (!place) return;
+    ((std::memcpy(&fields, place, sizeof fields), place += sizeof fields), ...);
   }
   template <std::size_t kMost>
   void operator()(FixedString<kMost>& text) {
@@ -232,11 +236,15 @@ class Reader {
     sequence.resize(is_good_ ? length : 0);
   }
   void read(void* to, std::size_t bytes, std::size_t alignment) {
+    if (const std::uint8_t* const place = take(bytes, alignment)) std::memcpy(to, place, bytes);
+  }
+  /// The place of the next `bytes` bytes; null if they are not there.
+  const std::uint8_t* take(std::size_t bytes, std::size_t alignment) {
     const std::size_t padding = calc_padding(at_, alignment);
     is_good_ = is_good_ && padding + bytes <= rest();
-    if (!is_good_) return;
-    std::memcpy(to, data_ + at_ + padding, bytes);
+    if (!is_good_) return nullptr;
     at_ += padding + bytes;
+    return data_ + at_ - bytes;
   }
 
   const std::uint8_t* const data_;
