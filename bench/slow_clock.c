@@ -1,5 +1,5 @@
-// To be preloaded: the clocks of a process pass a hundredth of the real time, and its waits with a
-// time limit last a hundred times as long. Under callgrind a program is that much slower. With
+// To be preloaded: the clocks of a process pass a fiftieth of the real time, and its waits with a
+// time limit last fifty times as long. Under callgrind a program is that much slower. With
 // clocks as slow as itself it does as many steps between two looks of a timer as without callgrind,
 // also beside other work. So its instructions per step do not depend on the machine's speed.
 #define _GNU_SOURCE
@@ -9,7 +9,7 @@
 #include <sys/time.h>
 #include <time.h>
 
-enum { kSlower = 100, kSecond_ns = 1000000000 };
+enum { kSlower = 50, kSecond_ns = 1000000000 };
 
 // The function of the C library that ours replaces.
 #define NEXT(name)               \
