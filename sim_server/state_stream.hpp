@@ -35,20 +35,19 @@ class StateSamples {
     const std::vector<model::StepRecord>& records = fleet.records();
     sample_.step(fleet.step());
     sample_.sim_time_ns(static_cast<std::int64_t>(fleet.step()) * period_ns_);
+    sample_.vehicles().resize(1);
+    bus::fill(sample_.vehicles().front(), records.front());
     std::size_t most = 1;
+    if (records.size() > 1)  // all vehicles have states of equal size
+      most = std::clamp<std::size_t>(max_bytes_ / bus::calc_size(sample_.vehicles().front()), 1,
+                                     std::size_t{SAMPLE_VEHICLES});
     for (std::size_t first = 0, end = 0; first < records.size(); first = end) {
-      if (first == 0) {  // all vehicles have states of equal size
-        sample_.vehicles().resize(1);
-        bus::fill(sample_.vehicles().front(), records.front());
-        most = std::clamp<std::size_t>(max_bytes_ / bus::calc_size(sample_.vehicles().front()), 1,
-                                       std::size_t{SAMPLE_VEHICLES});
-      }
       end = std::min(first + most, records.size());
       bool is_sample_wanted = false;
       for (std::size_t i = first; i < end; ++i) is_sample_wanted = is_sample_wanted || is_wanted(i);
       if (!is_sample_wanted) continue;
       sample_.vehicles().resize(end - first);
-      for (std::size_t i = first; i < end; ++i)
+      for (std::size_t i = std::max<std::size_t>(first, 1); i < end; ++i)
         bus::fill(sample_.vehicles()[i - first], records[i]);
       write(sample_);
     }
