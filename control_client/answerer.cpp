@@ -37,13 +37,15 @@ Answerer::Answerer(const config::Scenario& scenario, const sync::Run& run,
 
 const Commands* Answerer::answer(const States& sample) {
   answers_.step(sample.step());
-  answers_.vehicles().clear();
+  std::vector<ControlCommand>& answers = answers_.vehicles();
+  answers.resize(sample.vehicles().size());  // keeps the memory of those of the last sample
+  std::size_t count = 0;
   for (const VehicleState& state : sample.vehicles()) {
     const auto pilot = pilots_.find(state.vehicle_id());
-    if (pilot != pilots_.end())
-      answers_.vehicles().push_back(answer(pilot->second, sample.step(), state));
+    if (pilot != pilots_.end()) answers[count++] = answer(pilot->second, sample.step(), state);
   }
-  return answers_.vehicles().empty() ? nullptr : &answers_;
+  answers.resize(count);
+  return answers.empty() ? nullptr : &answers_;
 }
 
 const ControlCommand& Answerer::answer(Pilot& pilot, std::uint64_t step,
