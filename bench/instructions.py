@@ -1,8 +1,8 @@
-"""Instructions per step of the programs, counted by callgrind: a figure that other work does not change.
+"""Instructions per step of the programs, counted by callgrind: other work does not change them.
 
-A flight of 2,000 steps is subtracted from one of 4,000, so start and end do not count. The clocks of the
-programs are as slow as callgrind makes them (slow_clock.c). Of each program the threads count that a step
-wakes; what the others do follows the clock and not the steps.
+A flight of 2,000 steps is subtracted from one of 4,000, so start and end do not count. The clocks
+of the programs are as slow as callgrind makes them (slow_clock.c). Of each program the threads
+count that a step wakes; what the others do follows the clock and not the steps.
 """
 
 import re
@@ -19,32 +19,35 @@ STEPS = (2000, 4000)
 PERIOD_S = 0.001
 LONGEST_S = 600.0
 PLANTS = {"analytic": "  model: analytic", "slung_load": "  pendulum: ideal"}
-# Threads that a step wakes, without and with recorder. Server: the one that receives the answer flies the
-# step; another one writes the batches. Recorder: one receives them, one writes the files.
+# Threads that a step wakes, without and with recorder. Server: the one that receives the answer
+# flies the step; another one writes the batches. Recorder: one receives, one writes the files.
 STEP_THREADS = {"sim_server": (1, 2), "control_client": (1, 1), "recorder": (0, 2)}
 BARE_ENDS = {"sim_server": "ping", "control_client": "pong"}
 
-# Objects that do not count: valgrind's processor lacks the instructions for SHA-256 that real ones have.
+# Objects that do not count: valgrind's processor lacks the instructions of real ones for SHA-256.
 NOT_COUNTED = re.compile(r"^lib(crypto|slow_clock)\.")
 
-# Functions that wait, or prepare it. They depend on how often a message is there before a thread waits for it, which
-# other work decides: with them the count of a program varies by 7 %, without by 2 %.
-WAITING = re.compile(r"mutex_(timed|clock)lock|mutex_unlock_full|find_if<std::atomic<pthread_mutex_t|clock_gettime|futex"
-                     r"|sem_|cond_|gmtime_r")
+# Functions that wait, or prepare it. They depend on how often a message is there before a thread
+# waits for it, which other work decides: with them a count varies by 7 %, without by 2 %.
+WAITING = re.compile(r"mutex_(timed|clock)lock|mutex_unlock_full|clock_gettime|futex|sem_|cond_"
+                     r"|find_if<std::atomic<pthread_mutex_t|gmtime_r")
 
 Function = tuple[str, str]  # name of its object file, name
 
+C_OR_OURS = r"^libc\.|^(sim_server|control_client|recorder)$"  # which replace some of its functions
+
 # Parts of a program, by object file and function; the first that fits counts.
 PARTS = (
-    ("numbers as text", "", r"^std::to_chars|add_number|^fmt::|dragonbox"),
+    ("numbers as text", "", r"^std::to_chars|CsvFile::add\(double\)|^fmt::"),
     ("Simbody", r"^libSimTK", ""),
     ("plant", r"^sim_server$", r"Plant::|Pendulum|^sls::math|^SimTK"),
     ("law and mission", r"^control_client$",
      r"^sls::control::(?!Client|Answerer|AnswerStream)|^sls::math"),
-    ("locks", r"^libc\.|^(sim_server|control_client|recorder)$",
+    ("locks", C_OR_OURS,
      r"pthread_(mutex|rwlock|cond)|sem_|futex|^__lll|find_if<std::atomic<pthread_mutex_t"),
-    ("calendar time", r"^libc\.|^(sim_server|control_client|recorder)$", r"offtime|__tz|gmtime|localtime"),
-    ("memory", r"^libc\.|^libstdc", r"malloc|free|operator (new|delete)|^unlink_chunk|^tcache|calloc|realloc"),
+    ("calendar time", C_OR_OURS, r"offtime|__tz|gmtime|localtime"),
+    ("memory", r"^libc\.|^libstdc",
+     r"malloc|free|operator (new|delete)|^unlink_chunk|^tcache|calloc|realloc"),
     ("dynamic casts", r"^libstdc", r"dyncast|dynamic_cast|strcmp"),
     ("Fast DDS", r"^lib(fastrtps|fastdds|fastcdr)", ""),
     ("C and C++ library", r"^(lib|ld-)", ""),
@@ -95,7 +98,7 @@ def read_threads(profile: Path) -> list[Counter[Function]]:
 
 
 def calc_per_step(fewer: Path, more: Path, count: int) -> Counter[Function]:
-    """Instructions per step of the `count` threads that a step wakes: those with the largest difference."""
+    """Instructions per step of the `count` threads that a step wakes: those that differ most."""
     before, after = read_threads(fewer), read_threads(more)
     if len(before) != len(after):
         raise MeasurementError(f"{more.name}: expected {len(before)} threads, got {len(after)}")
@@ -113,8 +116,9 @@ def calc_per_step(fewer: Path, more: Path, count: int) -> Counter[Function]:
 
 def callgrind(programs: Programs, profile: Path, command: list[str]) -> list[str]:
     library = programs.build / "bench/libslow_clock.so"
-    return ["env", f"LD_PRELOAD={library}", "valgrind", "--tool=callgrind", "--separate-threads=yes",
-            "--trace-children=yes", f"--callgrind-out-file={profile}", *command]
+    return ["env", f"LD_PRELOAD={library}", "valgrind", "--tool=callgrind",
+            "--separate-threads=yes", "--trace-children=yes", f"--callgrind-out-file={profile}",
+            *command]
 
 
 def run_together(programs: Programs, commands: dict[str, list[str]]) -> None:
@@ -128,14 +132,15 @@ def run_together(programs: Programs, commands: dict[str, list[str]]) -> None:
         for name, process in processes.items():
             wait_for(process, deadline)
             if process.returncode != 0:
-                raise MeasurementError(f"{name}: ended with {process.returncode}: {logs[name].read_text().strip()}")
+                raise MeasurementError(f"{name}: ended with {process.returncode}: "
+                                       f"{logs[name].read_text().strip()}")
     finally:
         end_all(list(processes.values()))
 
 
 def count_flight(programs: Programs, plant: str, is_recorded: bool) -> dict[str, Counter[Function]]:
-    """Instructions per step of each function of server, client and, if `is_recorded`, recorder, in a figure
-    eight at 1 ms over shared memory."""
+    """Instructions per step of each function of server, client and, if `is_recorded`, recorder, in
+    a figure eight at 1 ms over shared memory."""
     profiles: dict[tuple[str, int], Path] = {}
     commands = {}
     for domain, steps in enumerate(STEPS, programs.domain):
@@ -159,6 +164,12 @@ def count_flight(programs: Programs, plant: str, is_recorded: bool) -> dict[str,
                                 STEP_THREADS[name][is_recorded]) for name in words}
 
 
+def sort_by_process(folder: Path) -> list[Path]:
+    """The profiles of `folder`, each named by its process, in the order of their start."""
+    profiles = [file.with_name(file.name.removesuffix("-01")) for file in folder.glob("*-01")]
+    return sorted(profiles, key=lambda profile: int(profile.name))
+
+
 def count_bare_loop(programs: Programs) -> dict[str, Counter[Function]]:
     """The same of the two ends of the bare loop (ping_pong.cpp)."""
     folders, commands = {}, {}
@@ -166,12 +177,12 @@ def count_bare_loop(programs: Programs) -> dict[str, Counter[Function]]:
         folders[steps] = programs.make_path("")
         folders[steps].mkdir()
         commands[f"ping of {steps} steps"] = callgrind(
-            programs, folders[steps] / "%p", [str(programs.probe_program), "ping", "--domain", str(domain),
-                                              "--round-trips", str(steps)])
+            programs, folders[steps] / "%p",
+            [str(programs.probe_program), "ping", "--domain", str(domain),
+             "--round-trips", str(steps)])
     run_together(programs, commands)
     # The first process is ping, which starts the other one.
-    first, second = zip(*(sorted((file.with_name(file.name.removesuffix("-01")) for file in folder.glob("*-01")),
-                                 key=lambda file: int(file.name)) for folder in folders.values()))
+    first, second = zip(*(sort_by_process(folder) for folder in folders.values()))
     return {"ping": calc_per_step(*first, 1), "pong": calc_per_step(*second, 1)}
 
 
@@ -191,38 +202,38 @@ def count_without_waits(functions: Counter[Function]) -> int:
     return round(sum(count for (_, name), count in functions.items() if not WAITING.search(name)))
 
 
-def format_breakdown(counted: dict[str, Counter[Function]], top: int = 25) -> str:
-    """Two tables: the parts of each program, and its `top` functions."""
+def format_parts(counted: dict[str, Counter[Function]]) -> list[str]:
+    """A line for each part, a column for each program."""
     parts = {name: sum_parts(functions) for name, functions in counted.items()}
     rows = [("instructions per step", *counted)]
     for part, *_ in PARTS:
         rows.append((part, *(f"{parts[name][part]:,.0f}" for name in counted)))
     rows.append(("all", *(f"{functions.total():,.0f}" for functions in counted.values())))
-    lines = format_lines(rows, left=(0,))
-    for name, functions in counted.items():
-        rows = [(name, "object", "function")]
-        for (of_object, function), instructions in functions.most_common(top):
-            rows.append((f"{instructions:,.0f}", of_object, shorten(function)))
-        lines += ["", *format_lines(rows, left=(1, 2))]
-    return "\n".join(lines)
+    rows.append(("without waits", *(f"{count_without_waits(functions):,}"
+                                    for functions in counted.values())))
+    return format_lines(rows, left=(0,))
 
 
-def shorten(function: str, longest: int = 80) -> str:
-    return function if len(function) <= longest else function[:longest - 1] + "…"
+def format_functions(name: str, functions: Counter[Function], top: int = 25) -> list[str]:
+    rows = [(name, "object", "function")]
+    for (of_object, function), instructions in functions.most_common(top):
+        rows.append((f"{instructions:,.0f}", of_object, function[:80]))
+    return format_lines(rows, left=(1, 2))
 
 
 def measure_instructions(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
     bare = count_bare_loop(programs)
-    counted = {end: functions for end, functions in bare.items()}
     figures = []
     for plant in ("analytic",) if is_quick else PLANTS:
         for is_recorded in (False, True):
             title = f"{plant}, {'with' if is_recorded else 'without'} recorder"
             flight = count_flight(programs, plant, is_recorded)
+            print(title, *format_parts({**bare, **flight}), "", sep="\n")
             for name, functions in flight.items():
-                counted[f"{name}, {title}"] = functions
+                if is_recorded:
+                    print(*format_functions(name, functions), "", sep="\n")
                 bound = bare.get(BARE_ENDS.get(name, ""))
-                figures.append(Figure("instructions", f"{name}, {title}", "per step", [functions.total()],
-                                      "that end of the bare loop", [bound.total()] if bound else [], LESS))
-    print(format_breakdown(counted))
+                figures.append(Figure(
+                    "instructions", f"{name}, {title}", "per step", [functions.total()],
+                    "that end of the bare loop", [bound.total()] if bound else [], LESS))
     return figures

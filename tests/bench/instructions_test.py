@@ -1,8 +1,8 @@
-"""Instructions per step of server, client and recorder, without waits, beside committed ones: a guard that needs no
-idle machine. Callgrind counts them. The flights are those of plant `analytic` with recorder; `./sls bench --only instructions` measures
-more, and lists parts and functions.
+"""Instructions per step of server, client and recorder, without waits, beside committed ones: a
+guard that needs no idle machine. Callgrind counts them in flights of plant `analytic` with
+recorder; `./sls bench --only instructions` measures more and lists parts and functions.
 
-    tests/bench/instructions_test.py BUILD [--write]    --write: instead writes the figures of this machine
+    tests/bench/instructions_test.py BUILD [--write]    --write: writes this machine's figures
 """
 
 import json
@@ -22,7 +22,7 @@ from bench.programs import Programs  # noqa: E402
 
 BUILD = pathlib.Path(sys.argv.pop(1)).resolve()
 FIGURES = pathlib.Path(__file__).with_name("instructions.json")  # by version of Fast DDS
-# Of the committed figure; the counts of six measurements beside 9 to 13 busy processes were within 2.2 %.
+# Of the committed figure; five counts beside 9 to 13 busy processes were within 2.2 %.
 MOST_MORE, MOST_LESS = 0.05, 0.1
 
 
@@ -68,15 +68,18 @@ class InstructionsTest(unittest.TestCase):
         committed = read_figures()[read_fast_dds()]
         for name, counted in measure().items():
             with self.subTest(name):
-                self.assertLessEqual(counted, committed[name] * (1 + MOST_MORE),
-                                     f"{name}: more instructions per step (./sls bench --only instructions)")
-                self.assertGreaterEqual(counted, committed[name] * (1 - MOST_LESS),
-                                        f"{name}: fewer instructions per step: write the new figures (--write)")
+                self.assertLessEqual(
+                    counted, committed[name] * (1 + MOST_MORE),
+                    f"{name}: more instructions per step (./sls bench --only instructions)")
+                self.assertGreaterEqual(
+                    counted, committed[name] * (1 - MOST_LESS),
+                    f"{name}: fewer instructions per step: write the new figures (--write)")
 
 
 if __name__ == "__main__":
     if "--write" in sys.argv:
-        FIGURES.write_text(json.dumps({**read_figures(), read_fast_dds(): measure()}, indent=2) + "\n")
+        known = {**read_figures(), read_fast_dds(): measure()}
+        FIGURES.write_text(json.dumps(known, indent=2) + "\n")
     elif obstacle := find_obstacle():
         print(f"skipped: {obstacle}")
         sys.exit(77)
