@@ -2,6 +2,7 @@
 #include <benchmark/benchmark.h>
 #include <slsPubSubTypes.h>
 
+#include <cmath>
 #include <memory>
 #include <string>
 #include <vector>
@@ -13,6 +14,7 @@
 #include "control_client/flight_controller.hpp"
 #include "fastdds_types.hpp"
 #include "sim_server/plants/analytic/analytic_plant.hpp"
+#include "sim_server/plants/cables/hybrid_motion.hpp"
 #include "sim_server/plants/plant.hpp"
 #include "sim_server/plants/slung_load/slung_load_plant.hpp"
 
@@ -64,6 +66,44 @@ void multirotor_figure_eight_step(benchmark::State& run) {
 }
 BENCHMARK(px4_published_step)->Arg(1)->Arg(100);
 BENCHMARK(multirotor_figure_eight_step)->Arg(1)->Arg(100);
+
+/// A step of 1 ms of vehicles that carry one load on a ring of cables, with new forces; the load is
+/// a point or turns.
+void step_cables(benchmark::State& run, bool is_rigid) {
+  using namespace sim::cables;
+  System system;
+  system.count = static_cast<std::size_t>(run.range(0));
+  system.is_rigid = is_rigid;
+  system.inertia_L = system.inverse_inertia_L = Eigen::Matrix3d::Identity();
+  Motion start{};
+  start.p_WL = start.v_WL = start.w_WL_L = Eigen::Vector3d::Zero();
+  start.q_WL = {1.0, 0.0, 0.0, 0.0};
+  Actions actions;
+  const double share = system.load_mass * system.gravity / static_cast<double>(system.count);
+  for (std::size_t i = 0; i < system.count; ++i) {
+    const double at = 6.2831853 * static_cast<double>(i) / static_cast<double>(system.count);
+    const Eigen::Vector3d out(std::cos(at), std::sin(at), 0.0);
+    system.vehicle_mass[i] = 0.5;
+    system.attachment_L[i] = is_rigid ? Eigen::Vector3d(0.3 * out) : Eigen::Vector3d::Zero();
+    const double lean = system.count > 1 ? 0.4 : 0.0;
+    const Eigen::Vector3d up = std::sin(lean) * out - std::cos(lean) * Eigen::Vector3d::UnitZ();
+    start.vehicles[i] = {system.attachment_L[i] + up, Eigen::Vector3d::Zero(), 1.0, 0.0};
+    actions.f_Q_W[i] =
+        share / std::cos(lean) * up - 0.5 * system.gravity * Eigen::Vector3d::UnitZ();
+  }
+  HybridMotion motion(system, start);
+  std::vector<Event> events;
+  std::size_t step = 0;
+  for (auto _ : run) {
+    actions.f_Q_W[0].x() += step++ % 2 == 0 ? 0.1 : -0.1;  // shakes the load
+    motion.step(actions, 0.001, events);
+  }
+  if (motion.taut().size() != system.count) run.SkipWithError("expected taut cables");
+}
+void cables_point_step(benchmark::State& run) { step_cables(run, false); }
+void cables_rigid_step(benchmark::State& run) { step_cables(run, true); }
+BENCHMARK(cables_point_step)->Arg(1)->Arg(3)->Arg(6)->Arg(16);
+BENCHMARK(cables_rigid_step)->Arg(1)->Arg(3)->Arg(6)->Arg(16);
 
 const std::vector<model::StepRecord>& records() {
   static const std::vector<model::StepRecord> flown = fly_records(load(), 1000);

@@ -1,0 +1,111 @@
+/// The mechanics of vehicles, cables and load at one instant: geometry, accelerations, impacts.
+/// README.md, eqs. (1) to (8). No DDS, no scenario.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+
+#include "common/model/parameters.hpp"
+#include "sim_server/plants/cables/complementarity.hpp"
+
+namespace sls::sim::cables {
+
+using Vectors = std::array<Eigen::Vector3d, kMaxCables>;
+
+/// The constants of a group. Cable i leads from vehicle i to a point of the load.
+struct System {
+  std::size_t count = 0;        ///< vehicles, 1 to kMaxCables
+  Vector vehicle_mass{};        ///< kg, > 0
+  Vectors attachment_L{};       ///< in the load, from its centre of mass, m
+  double load_mass = 0.2;       ///< kg, > 0
+  bool is_rigid = false;        ///< false: a point load, whose attitude stays
+  Eigen::Matrix3d inertia_L{};  ///< of a rigid load, kg·m²
+  Eigen::Matrix3d inverse_inertia_L{};
+  double gravity = 9.8;      ///< m/s², along +z
+  double restitution = 0.0;  ///< of a cable that arrives at its length, 0 to 1
+};
+
+struct Vehicle {
+  Eigen::Vector3d p_W, v_W;
+  double length, length_rate;  ///< of its cable, m and m/s
+};
+
+/// Where everything is and how it moves; as a rate, the derivative of each number.
+struct Motion {
+  Eigen::Vector3d p_WL, v_WL;
+  Eigen::Vector4d q_WL;    ///< w, x, y, z; rotates vectors from the load into W
+  Eigen::Vector3d w_WL_L;  ///< angular velocity of the load in the load, rad/s
+  std::array<Vehicle, kMaxCables> vehicles;
+};
+
+/// Forces and rates from outside, held over a step.
+struct Actions {
+  Vectors f_Q_W{};  ///< control force on each vehicle, N
+  model::Aerodynamics air;
+  Eigen::Vector3d disturbance_W = Eigen::Vector3d::Zero();  ///< on each vehicle, N
+  Vector length_acceleration{};                             ///< of each cable, m/s²
+};
+
+/// The cables at one instant; README.md, eqs. (2) to (4).
+struct Geometry {
+  Eigen::Matrix3d R_WL;  ///< of a rigid load
+  Vectors n_W;           ///< from the vehicle to its attachment, unit vector
+  Vectors moment_L;      ///< ρ × Rᵀ n, m
+  Vectors turn_L;        ///< J⁻¹ of it
+  Vector stretch;        ///< distance less length, m; 0 if taut
+  Vector stretch_rate;   ///< its derivative, m/s
+  Vector bend;           ///< |d² of the distance / dt²| by the motion across the cable, m/s²
+};
+
+/// sum = start + h rate, for the vehicles of `system`.
+void add(const System& system, const Motion& start, double h, const Motion& rate, Motion& sum);
+
+/// The geometry of the `cables`. A vehicle at its attachment has n = 0.
+void calc_geometry(const System& system, const Motion& motion, const Members& cables,
+                   Geometry& geometry);
+
+/// A of eq. (5), for the `cables`.
+void calc_matrix(const System& system, const Geometry& geometry, const Members& cables,
+                 Matrix& matrix);
+
+/// Accelerations without a pull: of the load, its rates, and each vehicle. And b of eq. (5), for
+/// the `cables`.
+void calc_free_rate(const System& system, const Motion& motion, const Actions& actions,
+                    Motion& rate);
+void calc_offset(const System& system, const Motion& motion, const Geometry& geometry,
+                 const Actions& actions, const Motion& free_rate, const Members& cables,
+                 Vector& offset);
+
+/// Adds to the accelerations `rate` those by the pulls of the `cables`, N: eq. (1). With impulses
+/// (N·s) and a motion it changes the velocities.
+void add_pulls(const System& system, const Geometry& geometry, const Vector& pulls,
+               const Members& cables, Motion& rate);
+
+/// Moves and turns the bodies as impulses would do it in a unit of time: eq. (8).
+void add_shifts(const System& system, const Geometry& geometry, const Vector& shifts,
+                const Members& cables, Motion& motion);
+
+/// The accelerations of an instant, and the cables that cause them.
+struct Accelerations {
+  Motion rate;
+  Vector tension;  ///< N, ≥ 0
+  Members taut;
+};
+
+/// The cables that may pull: those not shorter than `tolerance` below their length (m), whose ends
+/// do not approach by more than `rate_tolerance` (m/s).
+Members find_candidates(const System& system, const Geometry& geometry, double tolerance,
+                        double rate_tolerance);
+
+/// The accelerations of `motion`, where of the `candidates` those pull that have to; eq. (5).
+Accelerations calc_accelerations(const System& system, const Motion& motion,
+                                 const Geometry& geometry, const Actions& actions,
+                                 const Members& candidates);
+
+/// Changes the velocities of `motion` so that no cable of `candidates`, all at their length,
+/// lengthens; eqs. (6) and (7). Returns the impulses of all cables, N·s.
+Vector apply_impact(const System& system, double restitution, const Members& candidates,
+                    Motion& motion);
+
+}  // namespace sls::sim::cables
