@@ -12,5 +12,6 @@ void add_recording(pybind11::module_& module);
 void add_campaign(pybind11::module_& module);
 void add_batch(pybind11::module_& module);
 void add_client(pybind11::module_& module);
+void add_cables(pybind11::module_& module);
 
 }  // namespace sls::python

@@ -11,6 +11,7 @@ PYBIND11_MODULE(_sls_core, module) {
   add_flight(module);
   add_recording(module);
   add_measures(module);
+  add_cables(module);
   add_campaign(module);
   add_batch(module);
   add_client(module);

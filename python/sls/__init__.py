@@ -13,7 +13,7 @@ import typing as _typing
 if _typing.TYPE_CHECKING:
     from _sls_core import Now, Reference, Scenario, Vehicle
 
-    from sls import metrics
+    from sls import cables, metrics
     from sls.client import Client
     from sls.closed_loop import ClosedLoop, LoopReference, LoopState
     from sls.columns import Columns
@@ -47,6 +47,7 @@ _PLACES = {
     "Scenario": "_sls_core",
     "Trajectory": "sls.trajectory",
     "Vehicle": "_sls_core",
+    "cables": "sls.cables",
     "fly": "sls.flight",
     "load_scenario": "sls.scenario",
     "lqr": "sls.gains",
