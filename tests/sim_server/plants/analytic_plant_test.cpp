@@ -132,7 +132,7 @@ TEST(PlantTest, AdvancesInAnyNumberOfCallsWithTheSameBits) {
   config::Scenario scenario;
   scenario.plant = make_tilted_plant();
   scenario.plant.air.rotor_drag = 0.2;
-  for (const char* model : {"slung_load", "analytic"}) {
+  for (const char* model : {"slung_load", "analytic", "cables"}) {
     auto at_once = make(model, scenario), in_parts = make(model, scenario);
     for (int period = 0; period < 100; ++period) {
       const std::vector<Vector3d> force = {Vector3d(0.01 * period, -0.3, -16.0)};
@@ -148,7 +148,7 @@ TEST(PlantTest, AdvancesInAnyNumberOfCallsWithTheSameBits) {
 }
 
 TEST(PlantTest, RefusesAForceThatIsNotFiniteAndKeepsItsState) {
-  for (const char* model : {"slung_load", "analytic"}) {
+  for (const char* model : {"slung_load", "analytic", "cables"}) {
     config::Scenario scenario;
     auto plants = make(model, scenario);
     plants[0].plant->advance({Vector3d(0, 0, -16)}, 3);

@@ -1,0 +1,51 @@
+/// The scenario keys of the plant `cables`.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "common/config/scenario_keys.hpp"
+#include "sim_server/plants/cables/complementarity.hpp"
+
+namespace sls::sim {
+
+/// The cable of one vehicle.
+struct CableKeys {
+  Eigen::Vector3d attachment = Eigen::Vector3d::Zero();  ///< in the load, m
+  std::optional<double> distance;                        ///< at the start, m; none: taut
+  std::optional<double> alpha, beta;                     ///< at the start; none: of plant.initial
+};
+
+struct CablesKeys {
+  std::vector<CableKeys> cables;                // of each vehicle; empty: all end at a point load
+  std::optional<Eigen::Vector3d> load_inertia;  ///< xx, yy, zz, kg·m²; none: a point
+  Eigen::Vector3d load_products = Eigen::Vector3d::Zero();  ///< xy, xz, yz, kg·m²
+  std::optional<Eigen::Quaterniond> load_attitude;          ///< at the start; none: level
+  Eigen::Vector3d load_rates = Eigen::Vector3d::Zero();     ///< at the start, in the load, rad/s
+  double restitution = 0.0;                                 ///< of a cable that becomes taut
+};
+
+inline constexpr config::ListRange kCables{1, static_cast<int>(cables::kMaxCables), "cables"};
+
+template <class Map>
+void describe(Map& map, CableKeys& cable) {
+  using config::kOptional;
+  map.key(kOptional, "attachment_m", cable.attachment);
+  map.key(kOptional, "distance_m", cable.distance, config::kPositive);
+  map.key(kOptional, "alpha_rad", cable.alpha, config::kFullTurn);
+  map.key(kOptional, "beta_rad", cable.beta, config::kHalfTurn);
+}
+
+template <class Map>
+void describe_own(Map& map, config::Plant& plant, CablesKeys& keys) {
+  using config::kOptional;
+  map.key(kOptional, "cables", keys.cables, kCables);
+  map.key(kOptional, "load_inertia_kg_m2", keys.load_inertia, config::kPositive);
+  map.key(kOptional, "load_inertia_products_kg_m2", keys.load_products);
+  map.key(kOptional, "load_attitude", keys.load_attitude);
+  map.key(kOptional, "load_rates_rad_s", keys.load_rates);
+  map.key(kOptional, "restitution", keys.restitution, config::kProbability);
+  config::describe_point_mass_loads(map, plant);
+}
+
+}  // namespace sls::sim

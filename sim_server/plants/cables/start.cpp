@@ -1,0 +1,82 @@
+#include "sim_server/plants/cables/start.hpp"
+
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+
+namespace sls::sim::cables {
+namespace {
+
+using Eigen::Vector3d;
+
+/// The cable of a vehicle at the start.
+struct Placed {
+  model::RodDirection rod;
+  double distance;  // m
+  Vector3d p_LE_W;  // its end, from the load's centre
+  Vector3d p_WE;    // its end
+};
+
+Placed place_cable(const CablesKeys& keys, const PlantSetup::Vehicle& vehicle, std::size_t index) {
+  const CableKeys cable = keys.cables.empty() ? CableKeys() : keys.cables[index];
+  model::RodAngles angles = vehicle.initial.rod;
+  angles.alpha = cable.alpha.value_or(angles.alpha);
+  angles.beta = cable.beta.value_or(angles.beta);
+  Placed placed;
+  placed.rod = model::to_direction(angles);
+  placed.distance = cable.distance.value_or(vehicle.parameters.rod_length);
+  placed.p_LE_W = cable.attachment;
+  if (keys.load_attitude) placed.p_LE_W = keys.load_attitude->toRotationMatrix() * cable.attachment;
+  placed.p_WE = vehicle.initial.position;
+  if (vehicle.initial.placed == config::Body::kQuadrotor)
+    placed.p_WE += placed.distance * placed.rod.n_W;
+  return placed;
+}
+
+}  // namespace
+
+Vector3d calc_load_centre(const CablesKeys& keys, const PlantSetup::Vehicle& vehicle,
+                          std::size_t index) {
+  const Placed placed = place_cable(keys, vehicle, index);
+  return placed.p_WE - placed.p_LE_W;
+}
+
+Start make_start(const CablesKeys& keys, const std::vector<PlantSetup::Vehicle>& vehicles) {
+  Start start;
+  System& system = start.system;
+  system.count = vehicles.size();
+  system.gravity = vehicles[0].parameters.gravity;
+  system.restitution = keys.restitution;
+  if (keys.load_inertia) {
+    const Vector3d &moments = *keys.load_inertia, &products = keys.load_products;
+    system.is_rigid = true;
+    system.inertia_L << moments.x(), products.x(), products.y(), products.x(), moments.y(),
+        products.z(), products.y(), products.z(), moments.z();
+    system.inverse_inertia_L = system.inertia_L.inverse();
+  }
+  const Eigen::Quaterniond attitude =
+      keys.load_attitude.value_or(Eigen::Quaterniond(1.0, 0.0, 0.0, 0.0));
+  const Vector3d w_W = attitude.toRotationMatrix() * keys.load_rates;
+
+  Motion& motion = start.motion;
+  const Placed first = place_cable(keys, vehicles[0], 0);
+  motion.p_WL = first.p_WE - first.p_LE_W;
+  motion.v_WL =
+      vehicles[0].initial.v_WQ + first.distance * first.rod.n_dot_W - w_W.cross(first.p_LE_W);
+  motion.q_WL << attitude.w(), attitude.x(), attitude.y(), attitude.z();
+  motion.w_WL_L = keys.load_rates;
+  system.load_mass = 0.0;
+  for (std::size_t i = 0; i < system.count; ++i) {
+    const Placed placed = place_cable(keys, vehicles[i], i);
+    system.load_mass += vehicles[i].parameters.load_mass;
+    system.vehicle_mass[i] = vehicles[i].parameters.quad_mass;
+    system.attachment_L[i] =
+        keys.cables.empty() ? Vector3d(0.0, 0.0, 0.0) : keys.cables[i].attachment;
+    motion.vehicles[i] = {
+        motion.p_WL + placed.p_LE_W - placed.distance * placed.rod.n_W,
+        motion.v_WL + w_W.cross(placed.p_LE_W) - placed.distance * placed.rod.n_dot_W,
+        vehicles[i].parameters.rod_length, 0.0};
+  }
+  return start;
+}
+
+}  // namespace sls::sim::cables

@@ -1,0 +1,156 @@
+#include "sim_server/plants/cables/cables_plant.hpp"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+namespace sls::sim {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Two vehicles on a bar along x whose ends are at ±0.2 m, over the point (1, 2, −3).
+config::Scenario make_bar() {
+  config::Scenario scenario;
+  scenario.plant.model.name = "cables";
+  scenario.vehicle.quad_mass = 0.5;
+  scenario.vehicle.load_mass = 0.1;
+  scenario.vehicle.rod_length = 0.8;
+  scenario.vehicles.resize(2);
+  scenario.vehicles[0].offset = {0.2, 0.0, 0.0};
+  scenario.vehicles[1].offset = {-0.2, 0.0, 0.0};
+  scenario.plant.initial.position = {1.0, 2.0, -3.0};
+  auto& keys = scenario.plant.own.edit<CablesKeys>();
+  keys.load_inertia = Vector3d(1e-4, 3e-3, 3e-3);
+  keys.cables.resize(2);
+  keys.cables[0].attachment = scenario.vehicles[0].offset;
+  keys.cables[1].attachment = scenario.vehicles[1].offset;
+  return scenario;
+}
+
+std::unique_ptr<Plant> make(const config::Scenario& scenario) {
+  std::vector<std::uint32_t> ids;
+  for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id) ids.push_back(id);
+  return std::move(make_plants(find_plant_type(scenario.plant.model), scenario, ids).at(0).plant);
+}
+
+double find(const Plant& plant, std::size_t vehicle, const std::string& name) {
+  const std::vector<Signal> signals = plant.signals();
+  for (std::size_t i = 0; i < signals.size(); ++i)
+    if (signals[i].name == name)
+      return plant.measurement(vehicle).signals[static_cast<Eigen::Index>(i)];
+  throw std::out_of_range(name);
+}
+
+TEST(CablesPlantTest, EachVehicleMeasuresTheEndOfItsOwnCable) {
+  config::Scenario scenario = make_bar();
+  auto& keys = scenario.plant.own.edit<CablesKeys>();
+  keys.cables[1].distance = 0.5;
+  keys.cables[1].beta = 0.3;
+  const auto plant = make(scenario);
+  const double rounding = 1e-15 * 4.0;
+  for (const std::size_t i : {0, 1}) {
+    const model::Measurement& seen = plant->measurement(i);
+    const double sign = i == 0 ? 1.0 : -1.0, distance = i == 0 ? 0.8 : 0.5,
+                 beta = i == 0 ? 0.0 : 0.3;
+    const Vector3d end(1.0 + sign * 0.2, 2.0, -3.0), n(std::sin(beta), 0.0, std::cos(beta));
+    EXPECT_LE((seen.p_WL - end).norm(), rounding);
+    EXPECT_LE((seen.p_WQ - (end - distance * n)).norm(), rounding);
+    EXPECT_NEAR(seen.rod.beta, beta, rounding);
+    EXPECT_EQ(find(*plant, i, "cable_taut"), i == 0 ? 1.0 : 0.0);
+    EXPECT_EQ(find(*plant, i, "cable_length_m"), 0.8);
+    EXPECT_EQ(find(*plant, i, "load_att_w"), 1.0);
+  }
+  EXPECT_FALSE(plant->has_attitude());
+}
+
+TEST(CablesPlantTest, AnAttitudeTurnsTheLoadAboutTheEndsThatTheVehiclesPlace) {
+  config::Scenario scenario = make_bar();
+  auto& keys = scenario.plant.own.edit<CablesKeys>();
+  keys.load_attitude = Eigen::Quaterniond(std::sqrt(0.5), 0.0, 0.0, std::sqrt(0.5));  // x to y
+  keys.load_rates = {0.0, 0.0, 2.0};
+  scenario.vehicles[0].offset = {0.0, 0.2, 0.0};
+  scenario.vehicles[1].offset = {0.0, -0.2, 0.0};
+  scenario.plant.initial.v_WQ = {0.5, 0.0, 0.0};
+  const auto plant = make(scenario);
+  EXPECT_LE((plant->measurement(0).p_WL - Vector3d(1.0, 2.2, -3.0)).norm(), 1e-14);
+  // The first vehicle and its end have 0.5 m/s; the other end moves by ω × r = 2 × 0.4 more.
+  EXPECT_LE((plant->measurement(0).v_WL - Vector3d(0.5, 0.0, 0.0)).norm(), 1e-14);
+  EXPECT_LE((plant->measurement(1).v_WL - Vector3d(1.3, 0.0, 0.0)).norm(), 1e-14);
+  EXPECT_LE((plant->measurement(1).v_WQ - Vector3d(1.3, 0.0, 0.0)).norm(), 1e-14);
+}
+
+TEST(CablesPlantTest, SharesHangOnTheirCablesAndADropIsReported) {
+  config::Scenario scenario = make_bar();
+  scenario.vehicles[1].quad_mass = 0.7;
+  const auto plant = make(scenario);
+  const double share = 0.1 * 9.8;
+  std::vector<Vector3d> forces = {Vector3d(0.0, 0.0, -0.5 * 9.8 - share),
+                                  Vector3d(0.0, 0.0, -0.7 * 9.8 - share)};
+  plant->advance(forces, 500);
+  for (const std::size_t i : {0, 1}) {
+    EXPECT_NEAR(find(*plant, i, "cable_tension_n"), share, 1e-12);
+    EXPECT_NEAR(plant->measurement(i).p_WL.z(), -3.0, 1e-12);
+    EXPECT_TRUE(plant->take_remarks(i).empty());
+  }
+  // A vehicle that falls faster than its end of the bar slackens its cable at once, at 0.5 s.
+  forces[0] = {0.0, 0.0, 20.0};
+  plant->advance(forces, 1);
+  EXPECT_EQ(find(*plant, 0, "cable_tension_n"), 0.0);
+  EXPECT_EQ(plant->take_remarks(0), (std::vector<std::string>{"cable slack at 0.500000000 s"}));
+  EXPECT_TRUE(plant->take_remarks(0).empty());
+  EXPECT_TRUE(plant->take_remarks(1).empty());
+}
+
+TEST(CablesPlantTest, SaysWhenNoCableCarriesTheLoadAndLimitsItsRemarks) {
+  config::Scenario scenario;
+  scenario.plant.model.name = "cables";
+  const auto plant = make(scenario);
+  std::vector<std::string> remarks;
+  for (int k = 0; k < 400; ++k) {  // pushes and pulls in turn
+    plant->advance({Vector3d(0.0, 0.0, k % 2 == 0 ? 5.0 : -40.0)}, 10);
+    for (const std::string& remark : plant->take_remarks(0)) remarks.push_back(remark);
+  }
+  ASSERT_EQ(remarks.size(), 21u);
+  EXPECT_EQ(remarks[0], "cable slack at 0.000000000 s; no cable carries the load");
+  EXPECT_EQ(remarks[1].rfind("cable taut at 0.01", 0), 0u) << remarks[1];
+  EXPECT_EQ(remarks[20], "cable: no further remark on it");
+}
+
+TEST(CablesPlantTest, AdvancesInAnyNumberOfCallsWithTheSameBitsThroughEvents) {
+  config::Scenario scenario = make_bar();
+  scenario.plant.own.edit<CablesKeys>().cables[0].distance = 0.3;
+  const auto at_once = make(scenario), in_parts = make(scenario);
+  int taut = 0;
+  for (int period = 0; period < 100; ++period) {
+    const std::vector<Vector3d> forces = {Vector3d(0.01 * period, -0.3, -6.0),
+                                          Vector3d(0.2, 0.1, period % 7 < 3 ? -4.0 : -9.0)};
+    at_once->advance(forces, 7);
+    for (const int steps : {2, 0, 4, 1}) in_parts->advance(forces, steps);
+    for (const std::size_t i : {0, 1}) {
+      const model::Measurement &a = at_once->measurement(i), &b = in_parts->measurement(i);
+      ASSERT_EQ(a.p_WQ, b.p_WQ) << period;
+      ASSERT_EQ(a.v_WL, b.v_WL) << period;
+      ASSERT_EQ(a.signals, b.signals) << period;
+      ASSERT_EQ(at_once->take_remarks(i), in_parts->take_remarks(i)) << period;
+      taut += a.signals[2] == 1.0;
+    }
+  }
+  EXPECT_GT(taut, 20);
+  EXPECT_LT(taut, 180) << "no cable was slack";
+}
+
+TEST(CablesPlantTest, RefusesToFlyOneVehicleOfAGroupAlone) {
+  const config::Scenario scenario = make_bar();
+  try {
+    make_plant(find_plant_type(scenario.plant.model), config::make_vehicle_scenario(scenario, 1),
+               1);
+    FAIL() << "flies a part";
+  } catch (const config::ConfigError& error) {
+    EXPECT_STREQ(error.what(), "plant.cables: expected one for each of 1 vehicles, got 2");
+  }
+}
+
+}  // namespace
+}  // namespace sls::sim
