@@ -86,12 +86,12 @@ def parse_profile(text: Iterator[str]) -> Counter[Function]:
     return counts
 
 
-def read_threads(profile: Path) -> list[Counter[Function]]:
-    """One count for each thread, in the order of their start."""
-    threads = []
-    for file in sorted(profile.parent.glob(f"{profile.name}-*")):
+def read_threads(profile: Path) -> dict[str, Counter[Function]]:
+    """The counts of each thread, by its number."""
+    threads = {}
+    for file in profile.parent.glob(f"{profile.name}-*"):
         with file.open() as text:
-            threads.append(parse_profile(text))
+            threads[file.name.removeprefix(profile.name)] = parse_profile(text)
     if not threads:
         raise MeasurementError(f"{profile}: expected profiles of callgrind, got none")
     return threads
@@ -100,14 +100,12 @@ def read_threads(profile: Path) -> list[Counter[Function]]:
 def calc_per_step(fewer: Path, more: Path, count: int) -> Counter[Function]:
     """Instructions per step of the `count` threads that a step wakes: those that differ most."""
     before, after = read_threads(fewer), read_threads(more)
-    if len(before) != len(after):
-        raise MeasurementError(f"{more.name}: expected {len(before)} threads, got {len(after)}")
-    for earlier, later in zip(before, after):
-        later.subtract(earlier)
-    after.sort(key=lambda thread: thread.total())
+    for number, functions in after.items():
+        functions.subtract(before.get(number, {}))
+    threads = sorted(after.values(), key=lambda functions: functions.total())
     steps = STEPS[1] - STEPS[0]
     found: Counter[Function] = Counter()
-    for thread in after[-count:]:
+    for thread in threads[-count:]:
         for function, instructions in thread.items():
             if not NOT_COUNTED.match(function[0]):
                 found[function] += instructions / steps
