@@ -108,8 +108,8 @@ TEST(ClosedLoopErrorsTest, AModelThatDoesNotExistIsRefusedWithTheListOfThose) {
   EXPECT_EQ(alone.wait(), 2) << alone.output();
   EXPECT_TRUE(holds(
       alone.output(),
-      "plant.model: expected analytic, multirotor, slung_load or a shared library (a path ending "
-      "in .so), got slungload; did you mean 'slung_load'?"))
+      "plant.model: expected analytic, cables, multirotor, slung_load or a shared library (a path "
+      "ending in .so), got slungload; did you mean 'slung_load'?"))
       << alone.output();
   EXPECT_FALSE(std::filesystem::exists(folder / "recording"));
 }

@@ -261,17 +261,23 @@ void HybridMotion::meet(const Actions& actions, double time, std::size_t cable,
   const Geometry& geometry = now_.geometry;
   Members meeting = taut_;
   meeting.add(cable);
+  const Members before = taut_;
+  // Ends that approach so slowly that they would not get away by more than rounding stay.
+  const bool stays = geometry.stretch_rate[cable] < 0.0;
+  if (is_stuck_ || stays) {
+    settle(meeting, now_);
+    calc_geometry(system_, now_.motion, all_, now_.geometry);
+    if (is_stuck_)
+      keep_taut(actions, meeting);
+    else
+      choose_taut(actions, meeting);
+    report(before, time, events);
+    return;
+  }
   for (const std::size_t i : all_)
     if (geometry.stretch[i] >= -kTouching ||
         geometry.stretch[i] + kSimultaneous * geometry.stretch_rate[i] >= 0.0)
       meeting.add(i);
-  const Members before = taut_;
-  if (is_stuck_) {
-    settle(meeting, now_);
-    keep_taut(actions, meeting);
-    report(before, time, events);
-    return;
-  }
   place(meeting, now_);
   const Vector impulses = apply_impact(system_, system_.restitution, meeting, now_.motion);
   for (const std::size_t i : meeting)
