@@ -43,7 +43,8 @@ def measure_plant(programs: Programs, rounds: int, is_quick: bool) -> list[Figur
                 "plant", f"RK4 step of one multirotor of {MULTIROTORS[function]}, {vehicles} in turn",
                 "ns", values, better=LESS, goal=30_000))
         elif function != "closed_form_step":
-            figures.append(Figure("plant", function.replace("_", " "), "ns", values, better=LESS))
+            what = function.replace("_", " ") + (f", vehicles: {vehicles}" if vehicles else "")
+            figures.append(Figure("plant", what, "ns", values, better=LESS))
     return figures
 
 
