@@ -208,7 +208,8 @@ class Programs:
 
     def _fail_early(self) -> None:
         if self._programs.is_running("sim_server"):
-            self._fail(f"controller: ended with 0 before the flight was over, at step {self._find_step()}")
+            self._fail(f"controller: {describe_code(0)} at step {self._find_step()}, before the flight was over"
+                       f"{self._quote('controller', 0)}")
 
     def _watch_ready(self, now: float) -> None:
         if self._is_ready or not self._own:
