@@ -11,7 +11,7 @@
 #include "common/config/numbers.hpp"
 #include "python/bindings/bindings.hpp"
 #include "sim_server/plants/cables/mechanics.hpp"
-#include "sim_server/plants/multirotor/airframe.hpp"
+#include "sim_server/plants/inertia.hpp"
 
 namespace sls::python {
 namespace {
@@ -38,13 +38,8 @@ class Cables {
     }
     if (!inertia) return;
     const Eigen::Matrix3d& J = *inertia;
-    std::string defect =
-        sim::find_inertia_defect(J.diagonal(), Vector3d(J(0, 1), J(0, 2), J(1, 2)));
-    const Vector3d principal = sim::calc_principal_moments(J);
-    if (J != J.transpose())
-      defect = "expected a symmetric matrix, got another one";
-    else if (defect.empty() && !(principal[0] > 1e-12 * principal[2]))
-      defect = "expected principal moments > 0, got " + config::to_text(principal[0]);
+    const std::string defect = J == J.transpose() ? sim::find_free_inertia_defect(J)
+                                                  : "expected a symmetric matrix, got another one";
     if (!defect.empty()) throw config::ConfigError("load_inertia_kg_m2: " + defect);
     system_.is_rigid = true;
     system_.inertia_L = J;

@@ -11,11 +11,9 @@ namespace {
 constexpr int kMostRemarks = 20;  // of a vehicle
 
 const std::vector<PlantSetup::Vehicle>& check_vehicles(const PlantSetup& setup) {
-  const std::size_t cables = setup.plant.own.get<CablesKeys>().cables.size();
-  if (cables != 0 && cables != setup.vehicles.size())
-    throw config::ConfigError("plant.cables: expected one for each of " +
-                              std::to_string(setup.vehicles.size()) + " vehicles, got " +
-                              std::to_string(cables));
+  const std::string defect =
+      find_count_defect(setup.plant.own.get<CablesKeys>(), setup.vehicles.size());
+  if (!defect.empty()) throw config::ConfigError("plant.cables: " + defect);
   return setup.vehicles;
 }
 

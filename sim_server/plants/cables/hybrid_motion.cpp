@@ -75,9 +75,8 @@ HybridMotion::HybridMotion(const System& system, const Motion& start)
 /// The cables at their length whose ends do not approach.
 Members HybridMotion::find_touching(const Instant& instant) const {
   const double speed = instant.motion.v_WL.lpNorm<1>(), place = instant.motion.p_WL.lpNorm<1>();
-  Members touching = find_candidates(system_, instant.geometry, kTouching * (1.0 + place),
-                                     kTouching * (1.0 + speed));
-  return touching;
+  return find_candidates(system_, instant.geometry, kTouching * (1.0 + place),
+                         kTouching * (1.0 + speed));
 }
 
 /// Tensions and accelerations of the taut cables.

@@ -2,7 +2,7 @@
 
 #include "common/config/own_keys.hpp"
 #include "sim_server/plants/cables/start.hpp"
-#include "sim_server/plants/multirotor/airframe.hpp"
+#include "sim_server/plants/inertia.hpp"
 
 namespace sls::sim {
 namespace {
@@ -17,19 +17,19 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
     const auto& keys = scenario.plant.own.get<CablesKeys>();
     const std::size_t count = scenario.vehicles.size();
     if (count > cables::kMaxCables)
-      throw places.make_error_at("vehicles",
-                                 "expected at most 16 on one load, got " + std::to_string(count));
-    if (!keys.cables.empty() && keys.cables.size() != count)
-      throw places.make_error_at("plant.cables", "expected one for each of " +
-                                                     std::to_string(count) + " vehicles, got " +
-                                                     std::to_string(keys.cables.size()));
+      throw places.make_error_at("vehicles", "expected at most " +
+                                                 std::to_string(cables::kMaxCables) +
+                                                 " on one load, got " + std::to_string(count));
+    const std::string defect = find_count_defect(keys, count);
+    if (!defect.empty()) throw places.make_error_at("plant.cables", defect);
     check_load(keys, places);
     check_start(keys, scenario, places);
   }
 
   static void check_load(const CablesKeys& keys, const config::Places& places) {
     if (keys.load_inertia) {
-      const std::string defect = find_inertia_defect(*keys.load_inertia, keys.load_products);
+      const std::string defect =
+          find_free_inertia_defect(make_inertia(*keys.load_inertia, keys.load_products));
       if (!defect.empty()) throw places.make_error_at("plant.load_inertia_kg_m2", defect);
       return;
     }
@@ -74,6 +74,12 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
 };
 
 }  // namespace
+
+std::string find_count_defect(const CablesKeys& keys, std::size_t vehicles) {
+  if (keys.cables.empty() || keys.cables.size() == vehicles) return "";
+  return "expected one for each of " + std::to_string(vehicles) + " vehicles, got " +
+         std::to_string(keys.cables.size());
+}
 
 const config::ModelKeys<config::Plant>& cables_keys() {
   static const CablesOwnKeys keys;

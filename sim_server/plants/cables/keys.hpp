@@ -1,7 +1,9 @@
 /// The scenario keys of the plant `cables`.
 #pragma once
 
+#include <cstddef>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/config/scenario_keys.hpp"
@@ -24,6 +26,9 @@ struct CablesKeys {
   Eigen::Vector3d load_rates = Eigen::Vector3d::Zero();     ///< at the start, in the load, rad/s
   double restitution = 0.0;                                 ///< of a cable that becomes taut
 };
+
+/// Why the keys do not describe the cables of so many vehicles; empty if they do.
+std::string find_count_defect(const CablesKeys& keys, std::size_t vehicles);
 
 inline constexpr config::ListRange kCables{1, static_cast<int>(cables::kMaxCables), "cables"};
 

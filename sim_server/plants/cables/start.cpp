@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
+#include "sim_server/plants/inertia.hpp"
+
 namespace sls::sim::cables {
 namespace {
 
@@ -47,10 +49,8 @@ Start make_start(const CablesKeys& keys, const std::vector<PlantSetup::Vehicle>&
   system.gravity = vehicles[0].parameters.gravity;
   system.restitution = keys.restitution;
   if (keys.load_inertia) {
-    const Vector3d &moments = *keys.load_inertia, &products = keys.load_products;
     system.is_rigid = true;
-    system.inertia_L << moments.x(), products.x(), products.y(), products.x(), moments.y(),
-        products.z(), products.y(), products.z(), moments.z();
+    system.inertia_L = make_inertia(*keys.load_inertia, keys.load_products);
     system.inverse_inertia_L = system.inertia_L.inverse();
   }
   const Eigen::Quaterniond attitude =

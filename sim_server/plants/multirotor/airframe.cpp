@@ -1,22 +1,14 @@
 #include "sim_server/plants/multirotor/airframe.hpp"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
-#include <sstream>
+
+#include "sim_server/plants/inertia.hpp"
 
 namespace sls::sim {
 namespace {
 
 using Eigen::Matrix3d, Eigen::Vector3d;
-
-Matrix3d make_tensor(const Vector3d& moments, const Vector3d& products) {
-  Matrix3d tensor = moments.asDiagonal();
-  tensor(0, 1) = tensor(1, 0) = products[0];
-  tensor(0, 2) = tensor(2, 0) = products[1];
-  tensor(1, 2) = tensor(2, 1) = products[2];
-  return tensor;
-}
 
 /// Inertia of a point mass at `p` about the origin.
 Matrix3d calc_point_inertia(double mass, const Vector3d& p) {
@@ -59,7 +51,7 @@ Airframe make_airframe(const MultirotorKeys& keys, double quad_mass) {
   // Inertia about the centre of mass: of each part about its own centre, plus that of its mass at
   // its position.
   airframe.inertia_C_B =
-      make_tensor(keys.inertia, keys.products) + calc_point_inertia(bare_mass, -airframe.p_BC);
+      make_inertia(keys.inertia, keys.products) + calc_point_inertia(bare_mass, -airframe.p_BC);
   for (const FixedBodyKeys& body : keys.bodies)
     airframe.inertia_C_B += Matrix3d(body.inertia.asDiagonal()) +
                             calc_point_inertia(body.mass, body.position - airframe.p_BC);
@@ -72,23 +64,6 @@ double calc_largest_lift(const std::vector<FlyingRotor>& rotors) {
   for (const FlyingRotor& rotor : rotors)
     lift -= rotor.axis_B.z() * rotor.thrust_constant * rotor.max_speed * rotor.max_speed;
   return lift;
-}
-
-Vector3d calc_principal_moments(const Matrix3d& inertia) {
-  return Eigen::SelfAdjointEigenSolver<Matrix3d>(inertia).eigenvalues();
-}
-
-std::string find_inertia_defect(const Vector3d& moments, const Vector3d& products) {
-  const Vector3d principal = calc_principal_moments(make_tensor(moments, products));
-  std::ostringstream list;
-  list.precision(12);  // further digits are errors of the solver
-  list << principal[0] << ", " << principal[1] << ", " << principal[2];
-  const double rounding = 1e-12 * principal[2];
-  if (principal[0] < -rounding) return "expected principal moments >= 0, got " + list.str();
-  if (principal[2] > principal[0] + principal[1] + rounding)
-    return "expected principal moments of which none is larger than the sum of the others, got " +
-           list.str();
-  return "";
 }
 
 }  // namespace sls::sim

@@ -2,7 +2,6 @@
 /// both. No Simbody here.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "sim_server/autopilots/autopilot.hpp"
@@ -27,12 +26,5 @@ Airframe make_airframe(const MultirotorKeys& keys, double quad_mass);
 
 /// Largest collective thrust of a level vehicle at rest, N.
 double calc_largest_lift(const std::vector<FlyingRotor>& rotors);
-
-/// The principal moments of an inertia tensor, ascending.
-Eigen::Vector3d calc_principal_moments(const Eigen::Matrix3d& inertia);
-
-/// Triangle rule of a rigid body: no principal moment is larger than the sum of the others.
-/// Returns the defect, or an empty text.
-std::string find_inertia_defect(const Eigen::Vector3d& moments, const Eigen::Vector3d& products);
 
 }  // namespace sls::sim

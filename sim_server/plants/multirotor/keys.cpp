@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/config/own_keys.hpp"
+#include "sim_server/plants/inertia.hpp"
 #include "sim_server/plants/multirotor/airframe.hpp"
 
 namespace sls::sim {
@@ -38,7 +39,7 @@ class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> 
   static void check_inertia(const MultirotorKeys& keys, const config::Places& places) {
     const auto check = [&](const std::string& path, const Eigen::Vector3d& moments,
                            const Eigen::Vector3d& products) {
-      const std::string defect = find_inertia_defect(moments, products);
+      const std::string defect = find_inertia_defect(make_inertia(moments, products));
       if (!defect.empty()) throw places.make_error_at(path, defect);
     };
     check("plant.inertia_kg_m2", keys.inertia, keys.products);
