@@ -62,6 +62,7 @@ class Process {
 
   Host& host() const { return host_; }
   const std::string& name() const { return name_; }
+  bool is_server() const { return name_.rfind("server", 0) == 0; }
   bool has_ended() const { return has_ended_; }
   bool is_stopped() const { return is_stopped_; }
 

@@ -303,9 +303,7 @@ void Properties::on_announced(const Program& program, const Participant& message
 
 void Properties::on_unclaimed(const Program& program, const Peer& writer) {
   const Process& process = writer.process();
-  const bool is_served =
-      process.name().rfind("server", 0) == 0 && !process.has_ended() && !process.is_stopped();
-  if (is_served)
+  if (process.is_server() && !process.has_ended() && !process.is_stopped())
     find(fmt::format("claims: {} misses the claim of {}", program.name(), process.name()));
 }
 

@@ -252,8 +252,7 @@ bool ServerProgram::has_heard_every_claim() const {
   for (const auto& peer : setting_.network.peers()) {
     if (peer->process().has_ended() || peer->id() == id()) continue;
     if (peer_.known().count(peer->id()) == 0) return false;  // not everybody was discovered
-    if (peer->process().name().rfind("server", 0) == 0 && !claimed.has_claimed(peer->id()))
-      return false;
+    if (peer->process().is_server() && !claimed.has_claimed(peer->id())) return false;
   }
   return true;
 }

@@ -61,14 +61,15 @@ std::vector<std::string> ClientClocks::look(const std::vector<sync::Member>& con
   for (const sync::Member& client : controllers) {
     Clock& clock = present[client.peer];
     if (const auto known = clocks_.find(client.peer); known != clocks_.end()) clock = known->second;
-    if (now - clock.noted > kMeasured) clock.offset = ClockOffset();
+    const bool is_quiet = now - clock.noted > kMeasured;
+    if (is_quiet) clock.offset = ClockOffset();
     const auto offset = clock.offset.offset();
     // A clock near the limit must not be reported again and again.
     const auto limit = clock.is_wrong ? lifespan * 2 / 5 : lifespan / 2;
     const bool is_wrong = offset ? std::chrono::abs(*offset) > limit : clock.is_wrong;
     if (is_wrong != std::exchange(clock.is_wrong, is_wrong))
       news.push_back(describe(client, *offset, is_wrong));
-    const bool has_fallen_silent = clock.noted != sync::Time() && now - clock.noted > kMeasured;
+    const bool has_fallen_silent = is_quiet && clock.noted != sync::Time();
     is_any_wrong_ =
         is_any_wrong_ || is_wrong ||
         (!offset && (client.age > lifespan || (has_fallen_silent && !client.is_repeated)));

@@ -1,7 +1,6 @@
 #include "sim_server/core/preparation.hpp"
 
 #include <stdexcept>
-#include <utility>
 
 #include "sim_server/core/claim.hpp"
 
@@ -9,8 +8,7 @@ namespace sls::sim {
 
 void Preparation::claim(const Surroundings& around, sync::Time now) {
   // A server that was stopped did not listen: what came meanwhile is still to be read.
-  const sync::Duration pass = now - std::exchange(looked_, now);
-  if (pass > sync::kLongestLook) began_ += pass;
+  began_ += sync::note_look(looked_, now);
   // Of two servers the one that looks later finds the port of the other open and waits for its
   // claim, however slow discovery is.
   const bool is_settled = is_claim_settled(now - began_, around.stays_on_this_machine(),
