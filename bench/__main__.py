@@ -4,7 +4,6 @@ import argparse
 import json
 import os
 import signal
-import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +11,7 @@ from typing import Any, NoReturn
 
 from bench import campaign, instructions, loop, page, parts, start, view
 from bench.machine import describe_machine, now
-from bench.programs import MeasurementError, Programs, make_scratch
+from bench.programs import MeasurementError, Programs, make_scratch, take_domain
 from bench.results import Figure, format_table
 
 Measure = Callable[[Programs, int, bool], list[Figure]]
@@ -31,7 +30,6 @@ PARTS: dict[str, tuple[Measure, int]] = {  # int: number of rounds
     "view": (view.measure_view, 5),
     "page": (page.measure_page, 3),
 }
-DOMAINS = range(61, 81, 2)  # and the one after each; tests use the domains below 61
 
 
 class UsageError(Exception):
@@ -66,18 +64,6 @@ def parse_arguments() -> argparse.Namespace:
         except OSError as error:
             raise UsageError(f"--out {options.out}: expected a folder, got: {error.strerror}") from None
     return options
-
-
-def take_domain() -> tuple[int, socket.socket]:
-    """A DDS domain that, like the next one, no other bench uses as long as the socket exists."""
-    for domain in DOMAINS:
-        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            lock.bind(f"\0sls-bench-domain-{domain}")
-            return domain, lock
-        except OSError:
-            lock.close()
-    raise MeasurementError(f"expected a free DDS domain among {DOMAINS[0]} to {DOMAINS[-1]}, got none")
 
 
 def make_keys(programs: Programs) -> None:

@@ -46,6 +46,15 @@ def bench(*words, check=0):
     return done
 
 
+class FolderTest(unittest.TestCase):
+    """With an empty folder for each test."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = pathlib.Path(folder.name)
+
+
 class BoundTest(unittest.TestCase):
     def setUp(self):
         self.costs = loop.StepCosts.__new__(loop.StepCosts)
@@ -232,11 +241,10 @@ class RealTimeSearchTest(unittest.TestCase):
             self.assertLessEqual(max(seen), 256)
 
 
-class CampaignTest(unittest.TestCase):
+class CampaignTest(FolderTest):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.programs = Programs(BUILD, 0, pathlib.Path(folder.name))
+        super().setUp()
+        self.programs = Programs(BUILD, 0, self.folder)
         self.scenario = self.programs.scenario("figure_eight", campaign.fly_in_closed_form)
 
     def test_every_run_has_a_value_of_its_own(self):
@@ -288,12 +296,7 @@ totals: 115
 """
 
 
-class InstructionsTest(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
+class InstructionsTest(FolderTest):
     def test_a_profile_gives_what_each_function_took_itself(self):
         self.assertEqual(instructions.parse_profile(PROFILE.splitlines(keepends=True)), {
             ("libc.so.6", "malloc"): 8, ("sim_server", "sls::sim::step(int)"): 7,
@@ -316,11 +319,10 @@ class InstructionsTest(unittest.TestCase):
             {"locks": 3, "Fast DDS": 4, "law and mission": 8, "our own": 16, "Simbody": 32})
 
 
-class ProcessTest(unittest.TestCase):
+class ProcessTest(FolderTest):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.programs = Programs(BUILD, 0, pathlib.Path(folder.name))
+        super().setUp()
+        self.programs = Programs(BUILD, 0, self.folder)
 
     def test_busy_loops_are_processes_of_their_own_and_gone_at_the_end(self):
         with self.assertRaises(KeyError):
@@ -354,12 +356,7 @@ class ProcessTest(unittest.TestCase):
         self.assertLess(process.returncode, 0)
 
 
-class ProgramTest(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
+class ProgramTest(FolderTest):
     def test_mistakes_give_one_line_and_exit_code_two(self):
         for words, cause in ((["--only", "nonsense"], "nonsense"), (["--nonsense"], "--nonsense"),
                              (["--only"], "--only"), (["--json", self.folder / "no/file"], "--json"),

@@ -16,9 +16,8 @@ import unittest
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 
-from bench.__main__ import take_domain  # noqa: E402
 from bench.instructions import count_flight, count_without_waits  # noqa: E402
-from bench.programs import Programs  # noqa: E402
+from bench.programs import Programs, take_domain  # noqa: E402
 
 BUILD = pathlib.Path(sys.argv.pop(1)).resolve()
 FIGURES = pathlib.Path(__file__).with_name("instructions.json")  # by version of Fast DDS
