@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <utility>
+#include <vector>
 
 namespace sls::record {
 
@@ -27,7 +28,7 @@ void Inbox::open(std::uint64_t run_id, const bus::PeerId& server) {
 }
 
 bool Inbox::empty_into(Recording& recording) {
-  std::deque<Arrivals::Sample> samples;
+  std::vector<Arrivals::Sample> samples;
   {
     const std::lock_guard lock(mutex_);
     samples = arrivals_.take_all();

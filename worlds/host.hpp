@@ -67,15 +67,17 @@ class Process {
   bool is_stopped() const { return is_stopped_; }
 
   /// Does `action` now; when it is continued, if it is stopped; never if it has ended.
-  void run(const Timeline::Action& action) {
+  template <class Action>
+  void run(Action&& action) {
     if (has_ended_) return;
     if (is_stopped_)
-      backlog_.push_back(action);
+      backlog_.emplace_back(std::forward<Action>(action));
     else
       action();
   }
-  void run_at(Instant when, Timeline::Action action) {
-    timeline_.at(when, [this, action = std::move(action)] { run(action); });
+  template <class Action>
+  void run_at(Instant when, Action action) {
+    timeline_.at(when, [this, action = std::move(action)]() mutable { run(std::move(action)); });
   }
   /// A datagram arrives: the socket of a stopped process keeps the first ones.
   bool has_room() const { return !is_stopped_ || backlog_.size() < kMostBacklog; }

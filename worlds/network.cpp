@@ -40,9 +40,9 @@ bool Peer::is_acknowledged(TopicId topic) const {
   const History& history = histories_[index];
   for (const bus::PeerId& id : reader_peers_[index]) {
     const Peer* reader = network_.find(id);
-    const auto found = network_.channels_.find({{id_, id}, index});
-    if (!reader || found == network_.channels_.end() || found->second.delivered + 1 < history.next)
-      return false;
+    if (!reader) return false;
+    const Network::Channel& way = network_.channel(*this, *reader, index);
+    if (!way.writer_knows || way.delivered + 1 < history.next) return false;
   }
   return true;
 }
@@ -78,7 +78,9 @@ Peer& Network::join(Process& process) {
   std::memcpy(id.bytes.data(), &number, sizeof number);
   std::memcpy(id.bytes.data() + sizeof number, &next_id_, 4);
   ++next_id_;
-  return *peers_.emplace_back(std::make_unique<Peer>(*this, process, id));
+  for (auto& readers : channels_) readers.emplace_back();
+  channels_.emplace_back(channels_.size() + 1);
+  return *peers_.emplace_back(std::make_unique<Peer>(*this, process, id, peers_.size()));
 }
 
 Peer* Network::find(const bus::PeerId& id) const {
@@ -165,8 +167,8 @@ void Network::forget(Peer& observer, const Peer& observed) {
   for (std::size_t topic = 0; topic < kTopics; ++topic) {
     observer.writers_[topic].erase(observed.id());
     observer.reader_peers_[topic].erase(observed.id());
-    channels_.erase({{observer.id(), observed.id()}, topic});
-    channels_.erase({{observed.id(), observer.id()}, topic});
+    channel(observer, observed, topic) = {};
+    channel(observed, observer, topic) = {};
   }
 }
 
@@ -238,11 +240,10 @@ void Network::send_reliably(Peer& writer, Peer& reader, std::size_t topic) {
 }
 
 void Network::deliver(Peer& writer, Peer& reader, std::size_t topic, const Peer::Written& sample) {
-  const auto found = channels_.find({{writer.id(), reader.id()}, topic});
-  if (found == channels_.end() || !found->second.is_active()) return;
+  Channel& way = channel(writer, reader, topic);
   // A reader drops what is not newer than the last sample of the writer.
-  if (sample.number <= found->second.delivered) return;
-  found->second.delivered = sample.number;
+  if (!way.is_active() || sample.number <= way.delivered) return;
+  way.delivered = sample.number;
   reader.take(topic, sample, writer.id());
 }
 

@@ -57,8 +57,9 @@ class Peer {
     Host::Wall written;  ///< by the sender's clock
   };
 
-  Peer(Network& network, Process& process, const bus::PeerId& id)
-      : network_(network), process_(process), id_(id) {}
+  /// `number`: counts the peers of the network.
+  Peer(Network& network, Process& process, const bus::PeerId& id, std::size_t number)
+      : network_(network), process_(process), id_(id), number_(number) {}
 
   /// Of commands in real time, as config/qos/endpoints.xml.
   static constexpr ReaderLimits kRealtimeLimits{std::chrono::milliseconds(100),
@@ -143,6 +144,7 @@ class Peer {
   Network& network_;
   Process& process_;
   const bus::PeerId id_;
+  const std::size_t number_;
   std::vector<Endpoint> endpoints_;  // in the order of their discovery
   std::array<Reader, kTopics> readers_;
   std::array<History, kTopics> histories_;
@@ -188,10 +190,9 @@ class Network {
     bool is_waiting = false;      // for a repair
     bool is_active() const { return writer_knows && reader_knows; }
   };
-  using Key = std::pair<std::pair<bus::PeerId, bus::PeerId>, std::size_t>;
 
   Channel& channel(const Peer& writer, const Peer& reader, std::size_t topic) {
-    return channels_[{{writer.id(), reader.id()}, topic}];
+    return channels_[writer.number_][reader.number_][topic];
   }
   void discover(Peer& observer, Peer& observed);
   void match(Peer& observer, Peer& observed, const Peer::Endpoint& endpoint);
@@ -209,7 +210,7 @@ class Network {
   Random random_;
   std::vector<std::unique_ptr<Peer>> peers_;
   std::map<std::pair<const Host*, const Host*>, Link> links_;
-  std::map<Key, Channel> channels_;
+  std::vector<std::vector<std::array<Channel, kTopics>>> channels_;  // of writer to reader
   std::uint64_t next_id_ = 1;
   std::size_t record_history_ = 5000;
 };

@@ -89,7 +89,7 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   const std::vector<std::uint32_t> vehicle_ids_;
   FlightWatch* flight_ = nullptr;  // of the run
   std::unique_ptr<sim::ServerCore> core_;
-  std::deque<Event> events_;
+  std::vector<Event> events_;
   std::deque<Item> outbox_;
   sim::StateSamples states_;
   std::optional<sim::RecordBatches> batches_;

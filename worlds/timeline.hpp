@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <utility>
@@ -21,7 +22,15 @@ class Timeline {
   Instant now() const { return now_; }
   /// `when`: not before now.
   void at(Instant when, Action action) {
-    events_.push_back({std::max(when, now_), number_++, std::move(action)});
+    std::size_t place = actions_.size();
+    if (free_.empty()) {
+      actions_.push_back(std::move(action));
+    } else {
+      place = free_.back();
+      free_.pop_back();
+      actions_[place] = std::move(action);
+    }
+    events_.push_back({std::max(when, now_), number_++, place});
     std::push_heap(events_.begin(), events_.end(), is_later);
   }
   void after(Instant delay, Action action) { at(now_ + delay, std::move(action)); }
@@ -30,10 +39,12 @@ class Timeline {
   bool step(Instant end) {
     if (events_.empty() || events_.front().when >= end) return false;
     std::pop_heap(events_.begin(), events_.end(), is_later);
-    const Event event = std::move(events_.back());
+    const Event event = events_.back();
     events_.pop_back();
     now_ = event.when;
-    event.action();
+    const Action action = std::move(actions_[event.place]);  // it may add others
+    free_.push_back(event.place);
+    action();
     return true;
   }
   std::uint64_t count() const { return number_; }
@@ -42,7 +53,7 @@ class Timeline {
   struct Event {
     Instant when;
     std::uint64_t number;
-    Action action;
+    std::size_t place;  // of its action: the heap moves events often
   };
   static bool is_later(const Event& a, const Event& b) {
     return a.when != b.when ? a.when > b.when : a.number > b.number;
@@ -51,6 +62,8 @@ class Timeline {
   Instant now_{0};
   std::uint64_t number_ = 0;
   std::vector<Event> events_;
+  std::vector<Action> actions_;
+  std::vector<std::size_t> free_;  // places in actions_
 };
 
 }  // namespace sls::worlds

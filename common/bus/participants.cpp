@@ -32,18 +32,18 @@ void ParticipantDirectory::note(const Participant& sample, const PeerId& sender)
   const auto written = reader_.written();
   const sync::Membership::Arrival arrival{Clock::now(), written,
                                           std::chrono::system_clock::now() - written};
-  auto present = reader_.matched();
+  const auto present = reader_.matched();
   const std::lock_guard lock(mutex_);
-  members_.set_present(std::move(present));
+  members_.set_present(present);
   members_.note(sample, sender, arrival);
   version_.store(members_.version(), std::memory_order_release);
 }
 
 template <class Use>
 auto ParticipantDirectory::ask(Use use) const {
-  auto present = reader_.matched();
+  const auto present = reader_.matched();
   const std::lock_guard lock(mutex_);
-  members_.set_present(std::move(present));
+  members_.set_present(present);
   return use(members_);
 }
 
@@ -108,9 +108,9 @@ ServerDirectory::ServerDirectory(Node& node, std::function<void(const SimStatus&
 
 template <class Sample>
 bool ServerDirectory::note(const Sample& sample, const PeerId& sender) {
-  auto present = parameters_reader_.matched();
+  const auto present = parameters_reader_.matched();
   const std::lock_guard lock(mutex_);
-  servers_.set_present(std::move(present));
+  servers_.set_present(present);
   bool is_taken = true;
   if constexpr (std::is_same_v<Sample, SimStatus>)
     is_taken = servers_.note(sample, sender, Clock::now());
@@ -140,9 +140,9 @@ void ServerDirectory::look_for_impostors() {
   }
   const auto writers = node_.find_writers_of_servers();
   const auto misfits = node_.find_misfits();
-  auto present = parameters_reader_.matched();
+  const auto present = parameters_reader_.matched();
   const std::lock_guard lock(mutex_);
-  servers_.set_present(std::move(present));
+  servers_.set_present(present);
   const auto unclaimed = servers_.look_for_unclaimed(writers, now);
   for (const PeerId& peer : unclaimed.settled) node_.end_problem(peer, "claim");
   for (const auto& [peer, topics] : unclaimed.found) {

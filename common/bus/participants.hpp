@@ -85,9 +85,9 @@ class ServerDirectory {
   /// Calls `use` with the sync::Servers that are present now, under their lock.
   template <class Use>
   auto ask(Use use) const {
-    auto present = parameters_reader_.matched();
+    const auto present = parameters_reader_.matched();
     const std::lock_guard lock(mutex_);
-    servers_.set_present(std::move(present));
+    servers_.set_present(present);
     return use(static_cast<const sync::Servers&>(servers_));
   }
 

@@ -20,7 +20,8 @@ constexpr std::size_t kAges = 4;  // announcements: one of them was hardly delay
 
 void Membership::note(const Participant& sample, const bus::PeerId& sender,
                       const Arrival& arrival) {
-  if (!make_room(last_, kMostMembers, sender, present_)) return;
+  const auto is_present = [this](const bus::PeerId& peer) { return present_.count(peer) > 0; };
+  if (!make_room(last_, kMostMembers, sender, is_present)) return;
   const auto [known, is_new] = last_.try_emplace(sender);
   Heard& heard = known->second;
   const bool is_same_run = heard.announcement.run_id() == sample.run_id();
@@ -40,23 +41,25 @@ void Membership::note(const Participant& sample, const bus::PeerId& sender,
   ++version_;
 }
 
-std::vector<Member> Membership::find(ParticipantRole role, std::uint64_t run_id) const {
-  std::vector<Member> found = all();
-  const auto is_other = [&](const Member& member) {
-    return member.announcement.role() != role || member.announcement.run_id() != run_id;
-  };
-  found.erase(std::remove_if(found.begin(), found.end(), is_other), found.end());
-  return found;
-}
-
-std::vector<Member> Membership::all() const {
+template <class IsWanted>
+std::vector<Member> Membership::collect(const IsWanted& is_wanted) const {
   std::vector<Member> found;
   for (const auto& [peer, heard] : last_)
-    if (present_.count(peer) > 0)
+    if (is_wanted(heard.announcement) && present_.count(peer) > 0)
       found.push_back({peer, heard.announcement, heard.time,
                        *std::min_element(heard.ages.begin(), heard.ages.end()),
                        heard.ready_since.value_or(heard.time), heard.repeats >= kRepeats});
   return found;
+}
+
+std::vector<Member> Membership::find(ParticipantRole role, std::uint64_t run_id) const {
+  return collect([&](const Participant& announcement) {
+    return announcement.role() == role && announcement.run_id() == run_id;
+  });
+}
+
+std::vector<Member> Membership::all() const {
+  return collect([](const Participant&) { return true; });
 }
 
 int Membership::count_done(ParticipantRole role, std::uint64_t run_id) const {

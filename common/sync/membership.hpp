@@ -57,7 +57,9 @@ class Membership {
   };
 
   /// Sets the participants with a writer of sls/participant. Others are not present.
-  void set_present(std::set<bus::PeerId> present) { present_ = std::move(present); }
+  void set_present(const std::set<bus::PeerId>& present) {
+    if (present != present_) present_ = present;  // asked at every look, and rarely new
+  }
   const std::set<bus::PeerId>& present() const { return present_; }
 
   void note(const Participant& sample, const bus::PeerId& sender, const Arrival& arrival);
@@ -85,6 +87,10 @@ class Membership {
     std::chrono::system_clock::time_point written;  // by the sender's clock
     int repeats = 0;  // announcements without a change at about the usual interval, in a row
   };
+
+  /// Present participants whose announcement `is_wanted`.
+  template <class IsWanted>
+  std::vector<Member> collect(const IsWanted& is_wanted) const;
 
   std::map<bus::PeerId, Heard> last_;
   std::set<bus::PeerId> present_;

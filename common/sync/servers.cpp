@@ -108,9 +108,10 @@ Servers::Unclaimed Servers::look_for_unclaimed(
 }
 
 Servers::Server* Servers::find_or_add_server(const bus::PeerId& sender, Time now) {
-  std::set<bus::PeerId> kept = present_;
-  kept.insert(self_);
-  if (!make_room(servers_, kMostServers, sender, kept)) return nullptr;
+  const auto is_kept = [this](const bus::PeerId& peer) {
+    return peer == self_ || present_.count(peer) > 0;
+  };
+  if (!make_room(servers_, kMostServers, sender, is_kept)) return nullptr;
   const auto [server, is_new] = servers_.try_emplace(sender);
   if (is_new) server->second.known_since = now;
   return &server->second;

@@ -39,7 +39,9 @@ class Servers {
   explicit Servers(const bus::PeerId& self) : self_(self) {}
 
   /// Sets the participants with a writer of sls/parameters. Others are not present.
-  void set_present(std::set<bus::PeerId> present) { present_ = std::move(present); }
+  void set_present(const std::set<bus::PeerId>& present) {
+    if (present != present_) present_ = present;  // asked at every look, and rarely new
+  }
   const std::set<bus::PeerId>& present() const { return present_; }
 
   void note(const Parameters& sample, const bus::PeerId& sender, Time now);

@@ -39,7 +39,7 @@ void Arrivals::open(std::uint64_t run_id, const bus::PeerId& server) {
   for (Received& received : std::exchange(waiting_, {})) put(std::move(received));
 }
 
-std::deque<Arrivals::Sample> Arrivals::take_all() {
+std::vector<Arrivals::Sample> Arrivals::take_all() {
   size_ = 0;
   return std::exchange(samples_, {});
 }

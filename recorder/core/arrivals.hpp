@@ -7,6 +7,7 @@
 #include <set>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "common/bus/peer.hpp"
 #include "sls.h"
@@ -41,7 +42,7 @@ class Arrivals {
   /// other senders than its `server` are ignored.
   void open(std::uint64_t run_id, const bus::PeerId& server);
   /// The samples of the open run, oldest first.
-  std::deque<Sample> take_all();
+  std::vector<Sample> take_all();
 
   /// Status samples and entries of the open run that were lost because there was no room.
   std::uint64_t refused() const { return refused_; }
@@ -49,7 +50,7 @@ class Arrivals {
  private:
   const std::function<bool(std::uint64_t)> may_be_opened_;
   const std::size_t most_entries_;
-  std::deque<Sample> samples_;    // of the open run
+  std::vector<Sample> samples_;   // of the open run
   std::size_t size_ = 0;          // of samples_, in entries
   std::size_t refused_ = 0;       // dropped ones of the open run, in entries
   std::deque<Received> waiting_;  // samples of runs that may be opened

@@ -47,8 +47,11 @@ test("an operator pauses, steps and resumes a flight", async (t) => {
   await assert.rejects(client.call("/sls/pause", {}), /\/sls\/pause refused: /);
   await assert.rejects(client.call("/sls/step", { steps: 0 }), /expected a whole number/);
 
+  // The reply to a pause may name the step in work, which is still finished; that to a step request is exact.
+  const { step } = await client.call("/sls/step", {});
+  assert.ok([paused.step + 1, paused.step + 2].includes(step));
   const stepped = await client.call("/sls/step", { steps: 3 });
-  assert.equal(stepped.step, paused.step + 3);
+  assert.equal(stepped.step, step + 3);
   const read = makeReader(client.channels.get("sls/state"));
   // The state of the current step may not be published before the run continues.
   const state = await waitFor("the state after three steps", () => {
