@@ -48,7 +48,7 @@ Recording::Recording(const Segment& segment, const Parameters& parameters, sync:
     : segment_(segment),
       parameters_(parameters),
       scenario_(parse_scenario(segment, parameters)),
-      sinks_(make_sinks(segment.folder, parameters_, scenario_.record)),
+      sinks_(make_sinks(segment.folder, parameters_, scenario_.record, segment.write)),
       log_(scenario_, parameters_),
       core_(parameters_, segment.first_step, scenario_.record.flush_s, now, *this) {
   write_text(segment_.folder / "scenario.yaml", scenario_.text);

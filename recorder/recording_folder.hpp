@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "recorder/recording_reader.hpp"
+#include "recorder/sinks/growing_file.hpp"
 
 namespace sls::record {
 
@@ -43,6 +44,7 @@ struct Segment {
   int number = 1;
   std::uint64_t first_step = 0;
   std::optional<OpenedRecording> earlier;
+  WriteCall write = system_write();
 };
 
 /// A new segment after `earlier`, in its own folder.

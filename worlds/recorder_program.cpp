@@ -1,7 +1,9 @@
 #include "worlds/recorder_program.hpp"
 
 #include <spdlog/fmt/fmt.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <system_error>
 #include <utility>
 #include <variant>
@@ -18,7 +20,8 @@ RecorderProgram::RecorderProgram(Setting& setting, Host& host, std::string name,
           [this](std::uint64_t run_id) {
             return present_servers().may_fly(run_id, core_->vehicle());
           },
-          options.queue) {}
+          options.queue),
+      disk_(setting.seed) {}
 
 void RecorderProgram::start() {
   recorder_options_.folder =
@@ -108,9 +111,14 @@ void RecorderProgram::open() {
                                           is_disk_full_, [this](const auto& line) { say(line); });
   } else {
     try {
-      writing_ = std::make_unique<FileRecording>(record::make_segment(recorder_options_, *core_),
-                                                 run.parameters, now());
+      record::Segment segment = record::make_segment(recorder_options_, *core_);
+      segment.write = [this](int descriptor, const void* bytes, std::size_t size) {
+        return write_to_disk(descriptor, bytes, size);
+      };
+      writing_ = std::make_unique<FileRecording>(segment, run.parameters, now());
     } catch (const record::DamagedError& error) {
+      return exit(1, error.what());
+    } catch (const std::system_error& error) {
       return exit(1, error.what());
     }
   }
@@ -159,6 +167,15 @@ void RecorderProgram::write() {
     failure_ = error.what();
     has_closed_ = true;
   }
+}
+
+ssize_t RecorderProgram::write_to_disk(int descriptor, const void* bytes, std::size_t size) {
+  const bool is_short = size > 1 && disk_.chance(0.2);
+  if (is_disk_full_ && !is_short) {
+    errno = ENOSPC;
+    return -1;
+  }
+  return ::write(descriptor, bytes, is_short ? 1 + disk_.index(size - 1) : size);
 }
 
 void RecorderProgram::note_newest(const RecordBatch& batch) {

@@ -33,7 +33,7 @@ class RecorderProgram : public Program {
   const std::deque<StoredRecording>& recordings() const { return recordings_; }
   const std::filesystem::path& folder() const { return options_.folder; }
   bool has_recorded() const { return has_recorded_; }
-  /// Rows in memory cannot be written any more, or again.
+  /// Files and rows in memory cannot be written any more, or again.
   void set_disk_full(bool is_full) { is_disk_full_ = is_full; }
   /// The last recording that was closed is complete.
   bool is_complete() const { return recorded_.is_complete; }
@@ -50,6 +50,8 @@ class RecorderProgram : public Program {
   void write();
   bool write_samples();
   void note_newest(const RecordBatch& batch);
+  /// write(2) on a disk that takes less than it is given now and then, and nothing when it is full.
+  ssize_t write_to_disk(int descriptor, const void* bytes, std::size_t size);
   void on_killed() override { writing_.reset(); }
 
   const Options options_;
@@ -64,6 +66,7 @@ class RecorderProgram : public Program {
   std::optional<record::RunWatch::End> must_close_;
   bool has_recorded_ = false;
   bool is_disk_full_ = false;
+  Random disk_;          // which writes are short
   std::string failure_;  // of the writing thread
   bool has_closed_ = false;
   record::RecorderCore::Recorded recorded_;

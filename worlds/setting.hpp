@@ -27,11 +27,13 @@ struct FlownScenario {
 /// All that the programs of a world share. The world owns it.
 struct Setting {
   Setting(std::uint64_t seed, bool keeps_lines)
-      : random(Random(~seed).next()),
+      : seed(seed),
+        random(Random(~seed).next()),
         trace(keeps_lines),
         network(timeline, random.split()),
         properties(timeline, trace) {}
 
+  const std::uint64_t seed;
   Random random;
   Timeline timeline;
   Trace trace;

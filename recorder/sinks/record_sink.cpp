@@ -7,11 +7,12 @@ namespace sls::record {
 
 std::vector<std::unique_ptr<RecordSink>> make_sinks(const std::filesystem::path& folder,
                                                     const Parameters& parameters,
-                                                    const config::Record& record) {
+                                                    const config::Record& record,
+                                                    const WriteCall& write) {
   std::vector<std::unique_ptr<RecordSink>> sinks;
-  sinks.push_back(std::make_unique<CsvSink>(folder, parameters));
+  sinks.push_back(std::make_unique<CsvSink>(folder, parameters, write));
   if (record.has(config::RecordFormat::kMcap))
-    sinks.push_back(std::make_unique<McapSink>(folder / McapSink::kFile, parameters));
+    sinks.push_back(std::make_unique<McapSink>(folder / McapSink::kFile, parameters, write));
   return sinks;
 }
 

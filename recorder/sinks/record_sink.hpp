@@ -10,6 +10,7 @@
 
 #include "common/config/scenario.hpp"
 #include "recorder/rows.hpp"
+#include "recorder/sinks/growing_file.hpp"
 
 namespace sls::record {
 
@@ -42,10 +43,11 @@ class RecordSink {
   virtual std::vector<RecordedFile> finish() = 0;
 };
 
-/// Creates the files of the scenario's formats in `folder`.
+/// Creates the files of the scenario's formats in `folder`, which are written by `write`.
 /// @throws config::ConfigError, before any file is created, if `parameters` do not allow it.
 std::vector<std::unique_ptr<RecordSink>> make_sinks(const std::filesystem::path& folder,
                                                     const Parameters& parameters,
-                                                    const config::Record& record);
+                                                    const config::Record& record,
+                                                    const WriteCall& write);
 
 }  // namespace sls::record

@@ -289,6 +289,21 @@ TEST_F(CsvFileTest, AFullDiskIsReportedWithTheFilesName) {
   }
 }
 
+TEST_F(CsvFileTest, AShortOrInterruptedWriteIsContinued) {
+  int calls = 0;
+  CsvFile file(path_, "a,b", [&](int descriptor, const void* bytes, std::size_t) -> ssize_t {
+    if (++calls % 2 == 1) return ::write(descriptor, bytes, 1);
+    errno = EINTR;
+    return -1;
+  });
+  file.add(1);
+  file.add("x");
+  file.end_row();
+  file.flush();
+  EXPECT_EQ(read_bytes(path_), "a,b\n1,x\n");
+  EXPECT_EQ(calls, 15);  // a byte, an interruption, a byte, …
+}
+
 /// Writes `rows` rows into a file that may have at most `limit` bytes. @returns true on an error.
 /// Row i has i, a text with commas, quotes and line breaks, and i again.
 bool write_limited(CsvFile& file, rlim_t limit, int rows) {

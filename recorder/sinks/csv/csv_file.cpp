@@ -1,15 +1,10 @@
 #include "recorder/sinks/csv/csv_file.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
 #include <charconv>
 #include <cstring>
-
-#include "recorder/sinks/file_error.hpp"
+#include <utility>
 
 namespace sls::record {
 namespace {
@@ -50,17 +45,12 @@ bool is_special(char letter) {
 
 }  // namespace
 
-CsvFile::CsvFile(const std::filesystem::path& file, std::string_view header) : path_(file) {
-  descriptor_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
-  if (descriptor_ < 0) throw_errno(path_, "cannot create");
+CsvFile::CsvFile(const std::filesystem::path& file, std::string_view header, WriteCall write)
+    : file_(file, std::move(write)) {
   std::copy(header.begin(), header.end(), begin_field(header.size()));
   used_ += header.size();
   end_row();
   rows_ = 0;
-}
-
-CsvFile::~CsvFile() {
-  if (descriptor_ >= 0) ::close(descriptor_);
 }
 
 void CsvFile::add(double value) {
@@ -94,35 +84,23 @@ void CsvFile::end_row() {
 }
 
 void CsvFile::flush() {
-  std::size_t written = 0;
-  while (written < finished_) {
-    const ssize_t count = ::write(descriptor_, buffer_.data() + written, finished_ - written);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) {
-      const int error = errno;
-      cut_back_to_whole_rows(written);
-      errno = error;
-      throw_errno(path_, "cannot write");
-    }
-    written += static_cast<std::size_t>(count);
-  }
+  file_.append({buffer_.data(), finished_}, [this](std::size_t written) {
+    const std::size_t kept = count_whole_rows(written);
+    forget(kept);
+    return kept;
+  });
   forget(finished_);
 }
 
-/// Removes a row that was written only in part, because it would look like data.
-void CsvFile::cut_back_to_whole_rows(std::size_t written) {
+/// Bytes of the whole rows among the first `bytes` of the buffer.
+std::size_t CsvFile::count_whole_rows(std::size_t bytes) const {
   std::size_t whole = 0;
   bool is_quoted = false;
-  for (std::size_t i = 0; i < written; ++i) {
+  for (std::size_t i = 0; i < bytes; ++i) {
     if (buffer_[i] == '"') is_quoted = !is_quoted;
     if (buffer_[i] == '\n' && !is_quoted) whole = i + 1;
   }
-  const off_t end = ::lseek(descriptor_, 0, SEEK_END);
-  const auto surplus = static_cast<off_t>(written - whole);
-  if (end >= surplus && ::ftruncate(descriptor_, end - surplus) != 0) {
-    // The caller reports the earlier error.
-  }
-  forget(whole);
+  return whole;
 }
 
 void CsvFile::forget(std::size_t bytes) {

@@ -8,6 +8,8 @@
 #include <type_traits>
 #include <vector>
 
+#include "recorder/sinks/growing_file.hpp"
+
 namespace sls::record {
 
 /// A CSV file that grows row by row. Reading a number gives the same double that was written.
@@ -16,10 +18,8 @@ namespace sls::record {
 class CsvFile {
  public:
   /// Creates `file`, which must not exist, and writes `header` as its first line.
-  CsvFile(const std::filesystem::path& file, std::string_view header);
-  ~CsvFile();
-  CsvFile(const CsvFile&) = delete;
-  CsvFile& operator=(const CsvFile&) = delete;
+  CsvFile(const std::filesystem::path& file, std::string_view header,
+          WriteCall write = system_write());
 
   void add(double value);
   void add(std::string_view text);  ///< quoted if it has a comma, a quote or a line break
@@ -42,7 +42,7 @@ class CsvFile {
   std::uint64_t rows() const { return rows_; }
   /// Bytes that a flush would write.
   std::size_t pending_bytes() const { return finished_; }
-  const std::filesystem::path& path() const { return path_; }
+  const std::filesystem::path& path() const { return file_.path(); }
 
  private:
   /// Makes room for a field of `bytes` bytes and its separator, and writes the separator.
@@ -53,13 +53,12 @@ class CsvFile {
     row_begun_ = true;
     return buffer_.data() + used_;
   }
-  void cut_back_to_whole_rows(std::size_t written);
+  std::size_t count_whole_rows(std::size_t bytes) const;
   void forget(std::size_t bytes);
 
   static constexpr std::size_t kLongestInteger = 20;  // characters, of a negative one of 64 bits
 
-  const std::filesystem::path path_;
-  int descriptor_ = -1;
+  GrowingFile file_;
   std::vector<char> buffer_;
   std::size_t used_ = 0;      // bytes of the buffer that are in use
   std::size_t finished_ = 0;  // of those, bytes of whole rows

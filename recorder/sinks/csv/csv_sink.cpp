@@ -27,20 +27,22 @@ void write_row(CsvFile& file, const Rows& rows) {
 
 }  // namespace
 
-CsvSink::CsvSink(const std::filesystem::path& folder, const Parameters& parameters)
+CsvSink::CsvSink(const std::filesystem::path& folder, const Parameters& parameters,
+                 const WriteCall& write)
     : folder_(folder),
+      write_(write),
       state_header_(make_state_header(parameters)),
       is_of_fleet_(sync::is_fleet(parameters)),
-      states_(folder / StateRow::kFile, state_header_),
-      references_(folder / ReferenceRow::kFile, make_header<ReferenceRow>()),
-      flight_(folder / FlightRow::kFile, make_flight_header(is_of_fleet_)),
-      statuses_(folder / StatusRow::kFile, make_header<StatusRow, SimStatus>()),
-      commands_(folder / CommandRow::kFile, make_header<CommandRow>()) {}
+      states_(folder / StateRow::kFile, state_header_, write),
+      references_(folder / ReferenceRow::kFile, make_header<ReferenceRow>(), write),
+      flight_(folder / FlightRow::kFile, make_flight_header(is_of_fleet_), write),
+      statuses_(folder / StatusRow::kFile, make_header<StatusRow, SimStatus>(), write),
+      commands_(folder / CommandRow::kFile, make_header<CommandRow>(), write) {}
 
 void CsvSink::add(const StepRows& rows) {
   if (rows.has_state) write_row<StateRow>(states_, rows);
   if (rows.measured) {
-    if (!measured_) measured_.emplace(folder_ / MeasuredRow::kFile, state_header_);
+    if (!measured_) measured_.emplace(folder_ / MeasuredRow::kFile, state_header_, write_);
     write_row<MeasuredRow>(*measured_, rows);
   }
   if (rows.has_reference) write_row<ReferenceRow>(references_, rows);

@@ -14,7 +14,8 @@ namespace sls::record {
 /// The CSV files of README.md.
 class CsvSink : public RecordSink {
  public:
-  CsvSink(const std::filesystem::path& folder, const Parameters& parameters);
+  CsvSink(const std::filesystem::path& folder, const Parameters& parameters,
+          const WriteCall& write = system_write());
 
   void add(const StepRows& rows) override;
   void add(const SimStatus& status) override;
@@ -24,6 +25,7 @@ class CsvSink : public RecordSink {
 
  private:
   const std::filesystem::path folder_;
+  const WriteCall write_;
   const std::string state_header_;
   const bool is_of_fleet_;
   CsvFile states_, references_, flight_, statuses_, commands_;

@@ -1,15 +1,11 @@
 #include "recorder/sinks/mcap/mcap_file.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
 #include <zstd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <new>
 #include <stdexcept>
-
-#include "recorder/sinks/file_error.hpp"
+#include <utility>
 
 namespace sls::record {
 namespace {
@@ -64,10 +60,8 @@ struct McapFile::Compressor {
   std::vector<char> result;
 };
 
-McapFile::McapFile(const std::filesystem::path& file)
-    : path_(file), compressor_(std::make_unique<Compressor>()) {
-  descriptor_ = ::open(file.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_APPEND | O_CLOEXEC, 0644);
-  if (descriptor_ < 0) throw_errno(path_, "cannot create");
+McapFile::McapFile(const std::filesystem::path& file, WriteCall write)
+    : file_(file, std::move(write)), compressor_(std::make_unique<Compressor>()) {
   out_.append_raw(kMagic);
   begin_record(kHeader);
   out_.append(std::string_view());  // profile: none
@@ -75,9 +69,7 @@ McapFile::McapFile(const std::filesystem::path& file)
   end_record();
 }
 
-McapFile::~McapFile() {
-  if (descriptor_ >= 0) ::close(descriptor_);
-}
+McapFile::~McapFile() = default;
 
 // --- records -------------------------------------------------------------------------------------
 
@@ -93,23 +85,9 @@ void McapFile::end_record() {
   out_.replace(record_ + kOpcodeBytes, std::uint64_t{out_.bytes().size() - content});
 }
 
-/// If a write fails, the file is cut to its previous length.
 void McapFile::flush() {
   const std::string_view bytes = out_.bytes();
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t count = ::write(descriptor_, bytes.data() + done, bytes.size() - done);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) {
-      const int error = errno;
-      if (::ftruncate(descriptor_, static_cast<off_t>(written_)) != 0) {
-        // The earlier error is reported.
-      }
-      errno = error;
-      throw_errno(path_, "cannot write");
-    }
-    done += static_cast<std::size_t>(count);
-  }
+  file_.append(bytes, [](std::size_t) { return std::size_t{0}; });
   crc_.add(bytes);
   written_ += bytes.size();
   out_.clear();

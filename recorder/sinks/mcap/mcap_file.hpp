@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "recorder/byte_buffer.hpp"
+#include "recorder/sinks/growing_file.hpp"
 #include "recorder/sinks/mcap/crc32.hpp"
 
 namespace sls::record {
@@ -29,7 +30,7 @@ Compression describe_compression();
 class McapFile {
  public:
   /// Creates `file`, which must not exist.
-  explicit McapFile(const std::filesystem::path& file);
+  explicit McapFile(const std::filesystem::path& file, WriteCall write = system_write());
   ~McapFile();
   McapFile(const McapFile&) = delete;
   McapFile& operator=(const McapFile&) = delete;
@@ -54,7 +55,7 @@ class McapFile {
   void finish();
 
   std::uint64_t messages() const { return message_count_; }
-  const std::filesystem::path& path() const { return path_; }
+  const std::filesystem::path& path() const { return file_.path(); }
 
  private:
   struct MessageIndex {
@@ -81,8 +82,7 @@ class McapFile {
   void begin_record(std::uint8_t opcode);
   void end_record();
 
-  const std::filesystem::path path_;
-  int descriptor_ = -1;
+  GrowingFile file_;
   std::uint64_t written_ = 0;  // bytes in the file
   Crc32 crc_;                  // of these bytes
   ByteBuffer out_;             // records that are not written yet

@@ -40,9 +40,9 @@ std::string describe(const Parameters& parameters) {
 
 }  // namespace
 
-McapSink::McapSink(const std::filesystem::path& file, const Parameters& parameters)
+McapSink::McapSink(const std::filesystem::path& file, const Parameters& parameters, WriteCall write)
     : period_ns_(parameters.period_ns()),
-      file_(file),
+      file_(file, std::move(write)),
       mirrors_(sync::list_vehicle_ids(parameters)),
       emit_([this](std::size_t channel, std::int64_t time_ns, const auto& message) {
         write_mirror(channel, time_ns, message);

@@ -21,7 +21,8 @@ class McapSink : public RecordSink {
   static constexpr std::size_t kFlushBytes = 1 << 17;
 
   /// Creates `file`. Of the parameters it uses scenario, contract, vehicles, signals and period.
-  McapSink(const std::filesystem::path& file, const Parameters& parameters);
+  McapSink(const std::filesystem::path& file, const Parameters& parameters,
+           WriteCall write = system_write());
 
   void add(const StepRows& rows) override;
   void add(const SimStatus&) override {}
