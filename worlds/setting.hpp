@@ -26,9 +26,9 @@ struct FlownScenario {
 
 /// All that the programs of a world share. The world owns it.
 struct Setting {
-  Setting(std::uint64_t seed, bool keeps_lines)
-      : seed(seed),
-        random(Random(~seed).next()),
+  Setting(std::uint64_t world_seed, bool keeps_lines)
+      : seed(world_seed),
+        random(Random(~world_seed).next()),
         trace(keeps_lines),
         network(timeline, random.split()),
         properties(timeline, trace) {}
