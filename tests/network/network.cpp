@@ -169,10 +169,12 @@ void Network::disturb_wire(const std::string& host, const WireFaults& faults) {
   run(kSwitch, "ip link set " + host + "-w up && ip link set " + host + "-p master br0 up");
   std::vector<std::string> command = on(kSwitch);
   command.insert(command.end(),
-                 {SLS_FRAME_RELAY, host, host + "-w", "--delay-ms", std::to_string(faults.delay_ms),
-                  "--jitter-ms", std::to_string(faults.jitter_ms), "--duplicate-percent",
-                  std::to_string(faults.duplicate_percent), "--seed", std::to_string(faults.seed)});
-  wires_[host] = std::make_unique<Process>(command);
+                 {"/usr/bin/python3", "-BP", SLS_SOURCE_DIR "/python/sls/check/wire.py", host,
+                  host + "-w", std::to_string(faults.delay_ms), std::to_string(faults.jitter_ms),
+                  std::to_string(faults.duplicate_percent), std::to_string(faults.seed)});
+  const auto& wire = wires_[host] = std::make_unique<Process>(command);
+  if (!wait_until([&] { return !wire->output().empty(); }) || wire->output() != "ready\n")
+    throw std::runtime_error("wire of " + host + ": " + wire->output());
 }
 
 std::string Network::end_wire(const std::string& host) {

@@ -64,9 +64,9 @@ class Network {
     double duplicate_percent = 0.0;
     int seed = 1;
   };
-  /// Puts a wire with faults in both directions between `host` and the switch (frame_relay.cpp).
+  /// Puts a wire with faults in both directions between `host` and the switch (sls.check.wire).
   void disturb_wire(const std::string& host, const WireFaults& faults);
-  /// Ends that wire and returns its output: "frame_relay: 1000 frames, 52 duplicated, …".
+  /// Ends that wire and returns its output: "wire: 1000 frames, 52 duplicated, …".
   std::string end_wire(const std::string& host);
 
  private:

@@ -3,12 +3,12 @@
 import os
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 from sls.check.faults import Fault
 from sls.errors import RunError
 from sls.input_error import InputError
-from sls.launcher.place import BUILD
 
 NAMES = ("server", "controller", "recorder")
 RULE = ("nft 'add table bridge wire; add chain bridge wire f {{ type filter hook forward priority 0; }}; "
@@ -26,13 +26,13 @@ class Hosts:
                              + ("another user" if os.geteuid() else "no " + ", ".join(missing)))
         self._prefix = f"sls-check-{os.getpid()}-"
         self._values = {fault.word: fault.value for fault in faults}
-        self._wire: subprocess.Popen[bytes] | None = None
+        self._wire: subprocess.Popen[str] | None = None
 
     def __enter__(self) -> "Hosts":
         remove_what_was_killed()
         try:
             self._make()
-        except RunError:
+        except BaseException:
             self.__exit__()
             raise
         return self
@@ -40,7 +40,7 @@ class Hosts:
     def __exit__(self, *_: object) -> None:
         if self._wire:
             self._wire.terminate()
-            self._wire.wait()
+            self._wire.communicate()
         for host in (*NAMES, "switch"):
             subprocess.run(["ip", "netns", "delete", self._prefix + host], check=False, capture_output=True)
 
@@ -77,22 +77,16 @@ class Hosts:
         self.heal()
 
     def _delay(self, delay_ms: float, jitter_ms: float) -> None:
-        """Delays the controller's wire: by the kernel if it can (netem), else by the program of our tests."""
-        relay = BUILD / "tests/frame_relay"
-        try:
-            netem = f"root netem delay {delay_ms}ms {jitter_ms}ms"
-            self._run("switch", f"tc qdisc add dev controller {netem}")
-            self._run("controller", f"tc qdisc add dev eth0 {netem}")
-        except RunError:
-            if not relay.is_file():
-                raise InputError(f"--under delay_ms: expected a kernel with netem (sch_netem), or {relay}, got "
-                                 "neither") from None
-            self._run("switch", "ip link set controller nomaster && ip link add wire type veth peer name port && "
-                                "ip link set wire up && ip link set port master br0 up")
-            self._wire = subprocess.Popen(
-                [*self.on("switch"), relay, "controller", "wire", "--delay-ms", str(delay_ms), "--jitter-ms",
-                 str(jitter_ms), "--duplicate-percent", "0", "--seed", "1"],
-                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        """Puts a wire with delay between the controller and the switch."""
+        self._run("switch", "ip link set controller nomaster && ip link add wire type veth peer name port && "
+                            "ip link set wire up && ip link set port master br0 up")
+        wire = Path(__file__).with_name("wire.py")
+        command = [*self.on("switch"), sys.executable, "-BP", wire, "controller", "wire", str(delay_ms), str(jitter_ms)]
+        self._wire = subprocess.Popen(command, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+        assert self._wire.stdout
+        if (line := self._wire.stdout.readline()) != "ready\n":
+            got = (line + self._wire.stdout.read()).strip().rpartition("\n")[2]
+            raise RunError(f"placement hosts: expected a wire with delay, got: {got}")
 
     def _run(self, host: str, command: str) -> None:
         run(" ".join(self.on(host)) + " sh -c '" + command.replace("'", "'\\''") + "'")
