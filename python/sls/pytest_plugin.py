@@ -41,8 +41,8 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
     """One test for each check and placement."""
     if "sls_case" not in metafunc.fixturenames:
         return
-    from sls.check.check_file import find_checks, load_check
-    from sls.check.cli import find_refusal, parse_placements
+    from sls.check.check_file import find_checks, find_refusal, load_check
+    from sls.check.cli import parse_placements
     marker = metafunc.definition.get_closest_marker("sls")
     values = marker.kwargs if marker else {}
     if marker is None or marker.args or "check" not in values or not set(values) <= set(KEYS):

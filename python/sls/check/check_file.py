@@ -2,7 +2,9 @@
 
 import difflib
 import math
+import os
 import re
+import shutil
 import signal
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
@@ -26,10 +28,8 @@ if TYPE_CHECKING:
 MOST_BYTES = 1_000_000
 KINDS = ("outcome", "measure", "value", "event", "certificate")
 OUTCOMES = ("finished", "failed")
-EVENTS = {"take_over": "changes of the controller that flies",
-          "fail_safe": "steps flown with the fail-safe force",
-          "late_step": "steps without an answer of their own: held or fail-safe",
-          "refused_answer": "answers that the server refused"}
+EVENTS = ("take_over", "fail_safe", "late_step", "refused_answer")
+OF_ANSWERS = ("late_steps", "answer_age_max_ms")  # measures that are events rather than motion
 OVER = ("max", "min", "mean", "rms", "end")
 AXES = ("x", "y", "z")
 UNKNOWN = "unknown"  # of a certificate: --update writes it
@@ -150,10 +150,23 @@ def load_check(file: Path, library: Path | None = None) -> Check:
     if not any(one.kind == "outcome" for one in expectations):
         expectations.insert(0, Expectation(items, "outcome", "finished"))
     limit = values.get("limit_s")
-    placements = read_placements(values.get("placements"), controller)
-    return replace(check, expectations=tuple(expectations), placements=placements,
-                   faults=list_faults(values["under"]) if "under" in values else (),
-                   limit_s=read_positive(limit, "seconds") if limit else DEFAULT_LIMIT_S)
+    check = replace(check, expectations=tuple(expectations),
+                    faults=list_faults(values["under"]) if "under" in values else (),
+                    limit_s=read_positive(limit, "seconds") if limit else DEFAULT_LIMIT_S)
+    return replace(check, placements=read_placements(values.get("placements"), check))
+
+
+def find_refusal(check: Check, placement: str) -> str:
+    """What to expect instead of a placement that cannot fly and judge this check; empty if it can."""
+    kind = check.controller.kind if check.controller else ""
+    if kind == "command" and placement in ("in-process", "worlds"):
+        return "shm, udp or hosts, because its controller is a command"
+    if placement != "worlds":
+        return ""
+    if kind == "python":
+        return "another placement, because its controller is a Python function"
+    unseen = next((one for one in check.expectations if one.kind == "event" or one.what in OF_ANSWERS), None)
+    return f"another placement, because worlds do not judge {unseen.what} (line {unseen.place.line})" if unseen else ""
 
 
 def read_positive(place: Place, unit: str) -> float:
@@ -184,7 +197,7 @@ def read_expectation(place: Place, scenario: "Scenario") -> Expectation:
             what.fail_expected(f"64 hexadecimal digits, or {UNKNOWN} (./sls check --update writes them)")
     elif kind == "event":
         allowed = ("min", "max")
-        check_word(what, named, tuple(EVENTS))
+        check_word(what, named, EVENTS)
     elif kind == "measure":
         check_measure(what, named)
         allowed = ("min", "max", "vehicle", *MEASURES[named].options)
@@ -299,6 +312,8 @@ def read_participants(place: Place) -> Participant | None:
         if not what.is_list or not what.node.value:
             what.fail_expected("a list of words: program and arguments")
         words = [item.read_text("a word in quotes") for item in what.list_items()]
+        if not (os.access(folder / words[0], os.X_OK) if "/" in words[0] else shutil.which(words[0])):
+            what.list_items()[0].fail_expected("a program that exists")
     else:
         words = [what.read_text("FILE.py:NAME" if kind == "python" else "the path of a library")]
         path = folder / words[0].rpartition(":")[0] if kind == "python" else folder / words[0]
@@ -308,7 +323,7 @@ def read_participants(place: Place) -> Participant | None:
     made = Participant(own, "controller", kind, tuple(words), folder)
     if kind != "command":
         for key in keys:
-            if key not in (kind, "silent_s"):
+            if key not in (kind, "silent_s", *(["ready_s"] if kind == "python" else [])):
                 keys[key].fail(f"expected no such key beside {kind}, got one")
     if "env" in keys:
         env = {name: value.read_text("a text in quotes") for name, value in keys["env"].read_map("variables").items()}
@@ -338,16 +353,16 @@ def put_library(controller: Participant, scenario: "Scenario", file: Path) -> "S
     return load_scenario(file, changes={**changes, "controller": own})
 
 
-def read_placements(place: Place | None, controller: Participant | None) -> tuple[str, ...]:
+def read_placements(place: Place | None, check: Check) -> tuple[str, ...]:
     if place is None:
-        return ("shm",) if controller and controller.kind == "command" else ("in-process",)
+        return ("shm",) if check.controller and check.controller.kind == "command" else ("in-process",)
     if not place.is_list or not place.node.value:
         place.fail_expected(f"a list of {', '.join(PLACEMENTS)}")
     names = []
     for item in place.list_items():
         name = item.read_text("a placement")
         check_word(item, name, PLACEMENTS)
-        if name in ("in-process", "worlds") and controller and controller.kind == "command":
-            item.fail(f"expected shm, udp or hosts for a controller with a command of its own, got {name}")
+        if refusal := find_refusal(check, name):
+            item.fail(f"expected {refusal}, got {name}")
         names.append(name)
     return tuple(dict.fromkeys(names))

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from sls.campaign.arguments import Parser, to_count
-from sls.check.check_file import Check, find_checks, load_check
+from sls.check.check_file import Check, find_checks, find_refusal, load_check
 from sls.check.difference import find_difference
 from sls.check.faults import PLACEMENTS, WORDS, Fault, check_able, parse_fault
 from sls.check.flights import fly
@@ -90,7 +90,7 @@ def fly_and_judge(job: Job) -> Result:
                     job.repeats, folder=str(job.folder))
     try:
         flown = fly(job.check, job.placement, job.faults, job.folder, job.repeat - 1)
-        result.wall_s, result.problem = flown.wall_s, flown.problem
+        result.wall_s, result.problem, result.is_unusable = flown.wall_s, flown.problem, flown.is_unusable
         result.logs = {name: read_end(file) for name, file in flown.logs.items()}
         if flown.is_whole:
             try:
@@ -153,14 +153,6 @@ def plan(options: argparse.Namespace, checks: Sequence[Check], folder: Path) -> 
             jobs += [Job(check, placement, faults, repeat, options.repeat,
                          folder / f"{check.name}-{placement}-{repeat}") for repeat in range(1, options.repeat + 1)]
     return jobs
-
-
-def find_refusal(check: Check, placement: str) -> str:
-    kind = check.controller.kind if check.controller else ""
-    if kind == "command" and placement in ("in-process", "worlds"):
-        return "shm, udp or hosts, because its controller is a command"
-    return "another placement, because its controller is a Python function" if (kind, placement) == (
-        "python", "worlds") else ""
 
 
 class Comparison:

@@ -8,16 +8,16 @@ from sls.input_error import InputError
 
 PLACEMENTS = ("in-process", "shm", "udp", "hosts", "worlds")
 NETWORK, PROCESSES = ("hosts", "worlds"), ("shm", "udp", "hosts")
-# Of each word: least and most of its number, or the programs that it may name; placements; meaning.
-WORDS: dict[str, tuple[tuple[float, float] | tuple[str, ...], tuple[str, ...], str]] = {
-    "loss": ((0, 0.9), NETWORK, "share of the datagrams between hosts that are lost"),
-    "delay_ms": ((0, 1000), NETWORK, "delay of the datagrams, one way; on hosts of the controller's wire"),
-    "jitter_ms": ((0, 1000), NETWORK, "largest further delay of each datagram"),
-    "bandwidth_mbit": ((0.1, 10000), NETWORK, "rate of each link"),
-    "partition_s": ((0, 60), NETWORK, "for so long nothing passes between hosts"),
-    "kill": (("controller",), (*PROCESSES, "worlds"), "SIGKILL of the controller that flies; a standby flies on"),
-    "stop_s": ((0, 60), (*PROCESSES, "worlds"), "for so long the controller is stopped (SIGSTOP)"),
-    "busy": ((), ("in-process", *PROCESSES), "a busy loop for every processor during the flight"),
+# Of each word: least and most of its number, or the programs that it may name; placements.
+WORDS: dict[str, tuple[tuple[float, float] | tuple[str, ...], tuple[str, ...]]] = {
+    "loss": ((0, 0.9), NETWORK),
+    "delay_ms": ((0, 1000), NETWORK),
+    "jitter_ms": ((0, 1000), NETWORK),
+    "bandwidth_mbit": ((0.1, 10000), NETWORK),
+    "partition_s": ((0, 60), NETWORK),
+    "kill": (("controller",), (*PROCESSES, "worlds")),
+    "stop_s": ((0, 60), (*PROCESSES, "worlds")),
+    "busy": ((), ("in-process", *PROCESSES)),
 }
 
 

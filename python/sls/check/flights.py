@@ -3,7 +3,6 @@
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import sys
@@ -13,18 +12,21 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sls.check.check_file import Check, Participant
+from sls.check.check_file import DEFAULT_READY_S, Check, Participant
 from sls.check.faults import Fault, check_able
 from sls.check.hosts import Hosts
+from sls.check.python_law import STEPS
 from sls.dds_domain import own_domain
 from sls.launcher.place import BUILD, ROOT
 from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor
 
 PROFILES = {"shm": "default", "udp": "udp", "hosts": "lan"}
 HOST_OF = {"sim_server": "server", "recorder": "recorder", "controller": "controller", "standby": "controller"}
+CONTROLLERS = ("controller", "standby")
 OVERRUN_S = 20.0  # the others end so much later than the first
 STOP_S = 10.0     # a process under test has so long to end after its stop signal
-ENGINE_FAILED = 125  # of `docker run` without an engine or image: the first line says why, the last one is a hint
+# Without an engine or image `docker run` ends with this code; its first line says why, its last one is a hint.
+ENGINES, ENGINE_FAILED = ("docker", "podman"), 125
 WORLDS = 10       # of one flight of the placement `worlds`
 LOOPBACK = ("<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" multicast=\"true\"/></Interfaces>"
             "</General></Domain></CycloneDDS>")
@@ -34,6 +36,7 @@ LOOPBACK = ("<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"l
 class Flown:
     folder: Path
     problem: str = ""  # with a program, in one line
+    is_unusable: bool = False  # the problem says nothing about the controller
     is_whole: bool = False  # the recording can be judged
     wall_s: float = 0.0
 
@@ -67,11 +70,11 @@ def fly(check: Check, placement: str, faults: tuple[Fault, ...], folder: Path, n
         if any(fault.word == "busy" for fault in faults):
             stack.enter_context(Busy())
         if placement in ("in-process", "worlds"):
-            name = "closed_loop"
+            name = "controller" if check.controller else "closed_loop"
             words = [BUILD / "bin/closed_loop", f"--scenario={scenario}", f"--out={flown.recording}", "--force"]
             if check.controller and check.controller.kind == "python":
-                name, words = "controller", [*PYTHON_LAW, name, check.controller.words[0], scenario, flown.recording]
-            Programs(check, flown, faults, None).run({name: words})
+                words = [*PYTHON_LAW, "closed_loop", check.controller.words[0], scenario, flown.recording]
+            Programs(check, flown, (), None, name).run({name: words})
             if placement == "worlds" and not flown.problem:
                 fly_worlds(check, flown, scenario, faults, number)
         else:
@@ -131,15 +134,19 @@ class Busy:
 class Programs:
     """The programs of one flight, watched."""
 
-    def __init__(self, check: Check, flown: Flown, faults: tuple[Fault, ...], hosts: Hosts | None) -> None:
+    def __init__(self, check: Check, flown: Flown, faults: tuple[Fault, ...], hosts: Hosts | None,
+                 flyer: str = "sim_server") -> None:
+        """`flyer`: the program whose steps are watched. Another one than the server has the law in it."""
         self._check = check
+        self._flyer = flyer
         self._own = check.controller
+        self._is_command = bool(self._own and self._own.kind == "command")
         self._flown = flown
         self._hosts = hosts
         self._waiting = [fault for fault in faults if fault.word in ("kill", "stop_s", "partition_s")]
         self._later: list[tuple[float, Any]] = []  # what ends a fault, and when
         self._begin = self._grown = time.monotonic()
-        self._size = 0
+        self._step: int | None = None
         self._is_ready = not (self._own and self._own.ready)
         self._is_asked_to_stop = False
         self._groups: list[int] = []  # of processes under test, which may start further ones
@@ -147,11 +154,7 @@ class Programs:
     def run(self, programs: dict[str, list[Any]]) -> None:
         with Supervisor(say=lambda _: None, overrun_s=OVERRUN_S) as self._programs:
             for name, words in programs.items():
-                try:
-                    self._start(name, words)
-                except OSError as error:
-                    self._fail(f"{name}: expected a program that starts, got: {words[0]}: {error.strerror}")
-                    break
+                self._start(name, words)
             code = self._programs.wait_all(self._watch)
         for group in self._groups:
             with suppress(ProcessLookupError):
@@ -162,12 +165,9 @@ class Programs:
 
     def _start(self, name: str, words: list[Any]) -> None:
         more: dict[str, Any] = {}
-        is_own = name in ("controller", "standby") and self._own
-        if is_own and self._own.kind == "command":
+        is_own = name in CONTROLLERS and self._own
+        if is_own and self._is_command:
             more = {"cwd": self._own.folder, "process_group": 0}
-            program = str(words[0])  # setpriv would not say which program is missing
-            if not (os.access(self._own.folder / program, os.X_OK) if "/" in program else shutil.which(program)):
-                raise FileNotFoundError(2, "no such program")
         env = dict(os.environ)
         if not self._hosts:
             env.setdefault("CYCLONEDDS_URI", LOOPBACK)
@@ -191,24 +191,24 @@ class Programs:
         now = time.monotonic()
         for item in [item for item in self._later if item[0] <= now]:
             self._later.remove(item)
+            self._grown = now
             item[1]()
         if now - self._begin > self._check.limit_s:
             return self._fail(f"expected a flight of at most {self._check.limit_s:g} s, got a longer one "
-                              f"(at step {self._find_step()})")
+                              f"(at step {self._find_step() or 0})")
         self._watch_ready(now)
         self._watch_steps(now)
-        is_over = self._programs.codes.get("sim_server") is not None
-        if is_over and not self._is_asked_to_stop and self._own and self._own.kind == "command":
+        is_over = "sim_server" in self._programs.codes
+        if is_over and not self._is_asked_to_stop and self._is_command:
             self._is_asked_to_stop = True
-            for name in ("controller", "standby"):
+            for name in CONTROLLERS:
                 self._programs.send(name, self._own.stop, STOP_S)
-        elif not is_over and self._programs.codes.get("controller") == 0 and "sim_server" not in self._programs.codes:
-            if not self._later:
-                self._later.append((now + STOP_S, self._fail_early))
+        elif not is_over and self._programs.codes.get("controller") == 0 and not self._later:
+            self._later.append((now + STOP_S, self._fail_early))
 
     def _fail_early(self) -> None:
         if self._programs.is_running("sim_server"):
-            self._fail(f"controller: {describe_code(0)} at step {self._find_step()}, before the flight was over"
+            self._fail(f"controller: {describe_code(0)} at step {self._find_step() or 0}, before the flight was over"
                        f"{self._quote('controller', 0)}")
 
     def _watch_ready(self, now: float) -> None:
@@ -221,21 +221,28 @@ class Programs:
 
     def _watch_steps(self, now: float) -> None:
         """Faults begin with the first recorded steps; a controller that hangs stops them."""
-        try:
-            size = (self._flown.recording / "state.csv").stat().st_size
-        except OSError:
-            return
-        if size < 2000:  # the header
-            return
-        if size > self._size:
-            self._size, self._grown = size, now
+        step = self._find_step()
+        if step != self._step:
+            self._step, self._grown = step, now
             for fault in self._waiting:
                 self._begin_fault(fault, now)
             self._waiting = []
-        silent_s = self._own.silent_s if self._own else 60.0
-        if now - self._grown > silent_s and self._programs.is_running("sim_server") and not self._later:
-            self._programs.send("controller", signal.SIGKILL)  # a law that hangs ignores other signals
-            self._fail(f"controller: expected an answer within {silent_s:g} s, got none after step {self._find_step()}")
+        if self._later or not self._programs.is_running(self._flyer):
+            return
+        own, is_in_process = self._own, self._flyer != "sim_server"
+        if step is None and not is_in_process:
+            return  # the server says which participant does not come
+        is_loading = step is None and own and own.kind == "python"
+        patience_s = DEFAULT_READY_S if not own else own.ready_s if is_loading else own.silent_s
+        if now - self._grown <= patience_s:
+            return
+        name = self._flyer if is_in_process else "controller"
+        after, said = "" if step is None else f" after step {step}", self._read_line(name)
+        self._fail(f"{name}: expected an answer within {patience_s:g} s, got none{after}" + (said and f": {said}"))
+        if self._is_command:  # it may have to end what it has started, such as a container
+            self._programs.send(name, own.stop, STOP_S)
+        else:
+            self._programs.send(name, signal.SIGKILL)  # a law that hangs ignores other signals
 
     def _begin_fault(self, fault: Fault, now: float) -> None:
         if fault.word == "kill":
@@ -248,20 +255,23 @@ class Programs:
             self._hosts.cut()
             self._later.append((now + float(fault.value), self._hosts.heal))
 
-    def _find_step(self) -> str:
-        """The last recorded step."""
-        try:
-            with (self._flown.recording / "state.csv").open("rb") as file:
-                file.seek(max(0, file.seek(0, os.SEEK_END) - 2000))
-                return str(int(file.read().split(b"\n")[-2].split(b",")[1]))
-        except (OSError, IndexError, ValueError):
-            return "0"
+    def _find_step(self) -> int | None:
+        """The last step that is recorded, or that a Python law in one process has answered."""
+        with suppress(OSError):
+            count = int.from_bytes((self._flown.folder / STEPS).read_bytes(), sys.byteorder)
+            return count - 1 if count else None
+        with suppress(OSError, IndexError, ValueError), (self._flown.recording / "state.csv").open("rb") as file:
+            file.seek(max(0, file.seek(0, os.SEEK_END) - 8000))
+            return int(file.read().split(b"\n")[-2].split(b",")[1])
+        return None
 
     # --- afterwards -------------------------------------------------------------------------------
 
     def _conclude(self) -> None:
         """Names the program that is to blame, if the recording alone does not say it."""
         codes = {name: code for name, code in self._programs.codes.items() if name not in self._programs.expendable}
+        self._flown.is_unusable = self._is_engine_failure(codes.get("controller", 0)) or any(
+            code == 2 and not (self._is_command and name in CONTROLLERS) for name, code in codes.items())
         manifest = self._flown.read_manifest()
         outcome, reason = manifest.get("outcome"), str(manifest.get("reason"))
         if not self._flown.problem:
@@ -279,19 +289,18 @@ class Programs:
         return ""
 
     def _find_early_end(self, codes: dict[str, int], outcome: str | None, reason: str) -> str:
-        step = f"at step {self._find_step()}"
+        step = f"at step {self._find_step() or 0}"
         if outcome == "finished":
-            for name in ("controller", "standby"):
+            for name in CONTROLLERS:
                 code = codes.get(name, 0)
                 if code and not (self._is_asked_to_stop and (code < 0 or code > 128)):
                     return f"{name}: {describe_code(code)} after the flight{self._quote(name, code)}"
             return ""
-        own = ("controller", "standby")
         if outcome == "failed":  # the reason says it all, unless a controller ended first
             is_gone = re.search("interrupted by|not ready within|no answer", reason)
-            blamed = next((name for name in list(codes)[:1] if is_gone and name in own), "")
+            blamed = next((name for name in list(codes)[:1] if is_gone and name in CONTROLLERS), "")
         else:
-            blamed = next((name for name, code in codes.items() if code or name in own), "sim_server")
+            blamed = next((name for name, code in codes.items() if code or name in CONTROLLERS), "sim_server")
         code = codes.get(blamed, 0)
         return blamed and (f"{blamed}: {describe_code(code)} {step}, before the flight was over"
                            f"{self._quote(blamed, code)}")
@@ -305,8 +314,11 @@ class Programs:
     def _read_line(self, name: str, index: int = -1) -> str:
         return (self._read_log(name).strip().splitlines() or [""])[index][:200]
 
+    def _is_engine_failure(self, code: int) -> bool:
+        return self._is_command and code == ENGINE_FAILED and Path(self._own.words[0]).name in ENGINES
+
     def _quote(self, name: str, code: int) -> str:
-        line = self._read_line(name, 0 if code == ENGINE_FAILED else -1)
+        line = self._read_line(name, 0 if self._is_engine_failure(code) else -1)
         return f": {line}" if line else ", without a word"
 
 

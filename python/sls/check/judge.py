@@ -1,12 +1,10 @@
 """Judges a recording by the expectations of a check: from its folder alone."""
 
-import dataclasses
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import astuple, dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -15,7 +13,7 @@ from sls.check.check_file import UNKNOWN, Check, Expectation
 from sls.columns import Columns
 from sls.csv_tables import read_records
 from sls.input_error import InputError
-from sls.measures import measure
+from sls.measures import find_rows, measure
 from sls.recordings import RecordedVehicle, Recording, align
 
 REFUSED = ("rejected_not_finite", "rejected_force_limit", "rejected_run", "rejected_step", "rejected_vehicle",
@@ -61,9 +59,6 @@ class Judged:
         where = f" at {self.where}" if self.where else ""
         unit = f" {self.unit}" if self.unit and not self.problem else ""
         return f"{self.place}: {self.text}: expected {self.bound or 'it'}, got {self.got}{unit}{where}"
-
-    def to_json(self) -> dict[str, Any]:
-        return asdict(self)
 
 
 def open_recording(check: Check, folder: Path) -> Recording:
@@ -111,7 +106,7 @@ def judge_one(check: Check, expected: Expectation, recording: Recording) -> Judg
             return Judged(expected.text, False, unit=expected.unit, low=expected.low, high=expected.high, **more,
                           problem=problem)
         if len(recording.vehicle_ids) > 1:
-            judged = Judged(**{**asdict(judged), "vehicle": vehicle})
+            judged = replace(judged, vehicle=vehicle)
         if worst is None or not judged.margin >= worst.margin:  # also if the margin is not a number
             worst = judged
     assert worst is not None
@@ -142,14 +137,9 @@ def find_value(recording: Recording, expected: Expectation, vehicle: int) -> Fou
     of = recording.vehicle(vehicle)
     state = of.state
     columns = [find_column(of, name) for name in expected.expression.names]
-    is_chosen = np.ones(len(state["step"]), bool)
+    rows = find_rows(of, expected.stage, expected.window_s)
     for column in columns:
-        is_chosen &= np.isfinite(column)
-    if expected.stage is not None:
-        is_chosen &= align(state["step"], of.reference, ("stage",))[:, 0] == expected.stage
-    if expected.window_s:
-        is_chosen &= (state["sim_time_s"] >= expected.window_s[0]) & (state["sim_time_s"] <= expected.window_s[1])
-    rows = np.flatnonzero(is_chosen)
+        rows = rows[np.isfinite(column[rows])]
     if not len(rows):
         raise InputError("expected steps with all columns in this stage and window, got none")
     try:
@@ -183,7 +173,7 @@ def find_column(of: RecordedVehicle, name: str) -> np.ndarray:
 def find_event(recording: Recording, expected: Expectation, vehicle: int) -> Found:
     """Counts of the whole flight; those of a step have the first of them."""
     if expected.what == "late_step":
-        return dataclasses.astuple(measure(recording, "late_steps", vehicle_id=vehicle))
+        return astuple(measure(recording, "late_steps", vehicle_id=vehicle))
     if expected.what == "fail_safe":
         command = recording.vehicle(vehicle).command
         steps = command["step"][command["fault"] == "fail_safe"]

@@ -5,7 +5,7 @@ import json
 import math
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -64,7 +64,7 @@ class Result:
         return {"check": self.check, "file": self.file, "placement": self.placement, "under": self.under,
                 "repeat": self.repeat, "verdict": self.verdict, "problems": self.list_problems(),
                 "certificate": self.certificate, "wall_s": round(self.wall_s, 3), "report": self.page,
-                "expectations": [to_finite(one.to_json()) for one in self.judged]}
+                "expectations": [to_finite(asdict(one)) for one in self.judged]}
 
 
 def find_code(results: Sequence[Result]) -> int:

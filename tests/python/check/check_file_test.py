@@ -1,10 +1,13 @@
 """Check files and the words of --under: what is read, and one line for each mistake."""
 
+from xml.etree import ElementTree
+
 import pytest
 import yaml
 
 from sls.campaign.yaml_nodes import parse_yaml
 from sls.check.check_file import EVENTS, KINDS, OVER, find_checks, load_check
+from sls.check.cli import main
 from sls.check.faults import PLACEMENTS, WORDS, check_able, list_faults, parse_fault
 from sls.errors import ConfigError
 from sls.measures import MEASURES
@@ -64,30 +67,35 @@ MISTAKES = [
     ("participants: { server: {} }", ":3: participants.server: unknown key; expected one of controller"),
     ("participants: { controller: {}, controller: {} }", ":3: participants.controller: duplicate key"),
     ("participants: { controller: {} }", "expected exactly one of command, python, library, got none"),
-    ("participants: { controller: { command: [a], python: b } }", "got command and python"),
+    ("participants: { controller: { command: [sh], python: b } }", "got command and python"),
     ("participants: { controller: { command: a } }", "command: expected a list of words"),
-    ("participants: { controller: { command: [a, 3] } }", "command[1]: expected a word in quotes, got 3"),
+    ("participants: { controller: { command: [sh, 3] } }", "command[1]: expected a word in quotes, got 3"),
+    ("participants: { controller: { command: [./none] } }", ":3: participants.controller.command[0]: expected a program",
+     "got ./none"),
+    ("participants: { controller: { command: [no-engine, run] } }", "expected a program that exists, got no-engine"),
     ("participants: { controller: { python: none.py:law } }", "python: expected FILE.py:NAME", "got none.py:law"),
     ("participants: { controller: { library: none.so } }", "library: expected a library's file, got none.so"),
     ("participants: { controller: { library: short.so, env: { A: b } } }", "library: expected a library's file"),
-    ("participants: { controller: { command: [a], env: { A: 1 } } }", "env.A: expected a text in quotes, got 1"),
-    ("participants: { controller: { command: [a], stop: SIGWHAT } }", "stop: expected SIGINT, SIGTERM"),
-    ("participants: { controller: { command: [a], ready_s: no } }", "ready_s: expected a number of seconds > 0"),
-    ("participants: { controller: { command: [a] } }\nplacements: [in-process]",
-     ":4: placements[0]: expected shm, udp or hosts for a controller with a command of its own, got in-process"),
-]] + [("scenario: short\nexpect: [{ value: load_x_m, max: 0, window_s: [0, 3] }]",
+    ("participants: { controller: { command: [sh], env: { A: 1 } } }", "env.A: expected a text in quotes, got 1"),
+    ("participants: { controller: { command: [sh], stop: SIGWHAT } }", "stop: expected SIGINT, SIGTERM"),
+    ("participants: { controller: { command: [sh], ready_s: no } }", "ready_s: expected a number of seconds > 0"),
+    ("participants: { controller: { command: [sh] } }\nplacements: [shm, in-process]",
+     ":4: placements[1]: expected shm, udp or hosts, because its controller is a command, got in-process"),
+]] + [(f"scenario: short\nexpect: [{{ {item}, max: 0 }}]\nplacements: [worlds]",
+       f":3: placements[0]: expected another placement, because worlds do not judge {item.partition(' ')[2]} (line 2)")
+      for item in ("event: take_over", "event: late_step", "measure: late_steps", "measure: answer_age_max_ms")
+] + [("scenario: short\nexpect: [{ value: load_x_m, max: 0, window_s: [0, 3] }]",
        "expected a window within the flight, which ends at 2 s, got 3 s")]
 
 
 @pytest.mark.parametrize("mistake", MISTAKES, ids=[" ".join(text.split())[:60] for text, *_ in MISTAKES])
-def test_a_mistake_is_one_line_with_place_expected_and_got(tmp_path, mistake):
+def test_a_mistake_is_one_line_with_place_expected_and_got(tmp_path, capsys, mistake):
     text, *parts = mistake
-    file = tmp_path / "check.yaml"
+    file, junit = tmp_path / "check.yaml", tmp_path / "junit.xml"
     file.write_text(text + "\n")
-    with pytest.raises(ConfigError) as caught:
-        load_check(file)
-    said = str(caught.value)
-    assert "\n" not in said and said.startswith(f"{file}:"), said
+    assert main([str(file), "--junit", str(junit)]) == 2
+    said = ElementTree.parse(junit).find("testsuite/testcase/error").get("message")
+    assert capsys.readouterr().err == f"sls: error: {said}\n" and said.startswith(f"{file}:")
     for part in parts:
         assert part in said
 
@@ -108,7 +116,7 @@ scenario: mission
 expect:
   - { measure: settling_s, stage: 3, within_m: 0.05, for_s: 1, max: 12, because: "fast enough" }
   - { value: "abs(load_x_m - ref_x_m)", stage: figure_eight, window_s: [60, 80], max: 0.1 }
-participants: { controller: { command: [mine, "{domain}"], env: { A: b }, ready: joined, stop: SIGINT } }
+participants: { controller: { command: [sh, "{domain}"], env: { A: b }, ready: joined, stop: SIGINT } }
 under: { loss: 0.2, busy: }
 """)
     check = load_check(file)
@@ -118,13 +126,13 @@ under: { loss: 0.2, busy: }
     assert settling.text == "settling_s, within_m 0.05, for_s 1.0, stage 3" and settling.because == "fast enough"
     assert value.stage == 4 and value.window_s == (60, 80) and value.over == "max"
     assert check.placements == ("shm",)  # a command cannot fly in process
-    assert check.controller.words == ("mine", "{domain}") and check.controller.stop.name == "SIGINT"
+    assert check.controller.words == ("sh", "{domain}") and check.controller.stop.name == "SIGINT"
     assert [str(fault) for fault in check.faults] == ["loss=0.2", "busy"]
 
 
 @pytest.mark.parametrize("word", WORDS)
 def test_a_fault_that_a_placement_cannot_do_is_refused_by_name(word):
-    number, able, _ = WORDS[word]
+    number, able = WORDS[word]
     fault = parse_fault(word if not number else f"{word}={number[-1]}")
     for placement in ("in-process", "shm", "udp", "hosts", "worlds"):
         if placement in able:

@@ -10,6 +10,7 @@ import socket
 import subprocess
 import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -56,9 +57,13 @@ def check(tmp_path):
         participants = f"participants: {{ controller: {{ {controller} }} }}\n" if controller else ""
         file = tmp_path / "check.yaml"
         file.write_text(f"scenario: {scenario}\n{participants}expect:\n  - {expect}\n")
-        done = start(tmp_path, str(file), "--json", str(tmp_path / "json"), *words)
+        done = start(tmp_path, str(file), "--json", "json", "--junit", "junit.xml", *words)
         said, _ = done.communicate(timeout=150)
-        return done.returncode, json.loads((tmp_path / "json").read_text())["flights"], said
+        flights = json.loads((tmp_path / "json").read_text())["flights"]
+        suites, verdicts = ElementTree.parse(tmp_path / "junit.xml").getroot(), [one["verdict"] for one in flights]
+        assert [int(suites.get(key)) for key in ("tests", "failures", "errors")] == [
+            len(flights), verdicts.count("not held"), verdicts.count("unusable")], said
+        return done.returncode, flights, said
     return run
 
 
@@ -87,14 +92,6 @@ def test_hosts_that_lose_packets_and_are_cut_give_the_same_bytes(check):
     assert code == 0, said
     assert flights[0]["certificate"] == check("python: law.py:law")[1][0]["certificate"]
     assert not [path for path in Path("/run/netns").glob(f"sls-check-{os.getpid()}-*")]
-
-
-def test_without_root_hosts_are_refused_by_name(tmp_path, monkeypatch):
-    from sls.check.hosts import Hosts
-    from sls.errors import ConfigError
-    monkeypatch.setattr(os, "geteuid", lambda: 1000)
-    with pytest.raises(ConfigError, match="placement hosts: expected root and the programs .*, got another user"):
-        Hosts(())
 
 
 def test_a_killed_controller_is_replaced_by_its_standby(check):
@@ -143,21 +140,20 @@ def test_the_example_of_the_document_holds_and_its_bug_is_found(tmp_path):
 
 
 SHELL = "command: [sh, -c, '{}']"
+CLIENT = (f"command: [{sys.executable}, -BPm, sls.check.python_law, client, 'law.py:hang', "
+          "'{scenario}', '{qos}', '{domain}', '{name}', '{strength}']")
 
 
 @pytest.mark.parametrize("controller, expected", [
-    ("command: [./none]", "controller: expected a program that starts, got: ./none: no such program"),
-    ("command: [no-such-program]", "controller: expected a program that starts, got: no-such-program: no such program"),
     (SHELL.format("echo no licence; exit 3"),
      "controller: ended with 3 at step 0, before the flight was over: no licence"),
-    (SHELL.format("echo docker: Cannot connect; echo Run docker --help; exit 125"),
-     "controller: ended with 125 at step 0, before the flight was over: docker: Cannot connect"),
     (SHELL.format("exit 0"), "controller: ended with 0 at step 0, before the flight was over, without a word"),
     (SHELL.format("sleep 1000"), "outcome finished: expected it, got failed: not ready within 4 s: controller"),
     (SHELL.format("echo hello; sleep 1000") + ", ready: joined, ready_s: 3",
      "controller: expected 'joined' in its output within 3 s, got hello"),
     ("python: law.py:crash", "controller: ended by SIGSEGV at step 300, before the flight was over"),
     ("python: law.py:hang, silent_s: 1", "controller: expected an answer within 1 s, got none after step 299"),
+    (f"{CLIENT}, silent_s: 1", "controller: expected an answer within 1 s, got none after step 299"),
     ("python: law.py:nonsense", "failed: controller 'controller' answered step 300 with a force beyond"),
     ("python: law.py:broken", "controller: ended with 1 at step 0, before the flight was over: controller: "),
 ])
@@ -170,6 +166,45 @@ def test_the_verdict_names_what_a_controller_did(check, tmp_path, controller, ex
     page = (tmp_path / "pages/check-shm/report.html").read_text()
     assert expected.partition(",")[0].replace("'", "&#x27;") in page and "Output of the programs" in page
     assert (tmp_path / "pages/index.html").is_file()
+
+
+@pytest.mark.parametrize("controller, expected", [
+    ("python: law.py:hang, silent_s: 1", "controller: expected an answer within 1 s, got none after step 299"),
+    ("python: late.py:law, ready_s: 2", "controller: expected an answer within 2 s, got none"),
+    ("python: law.py:crash", "controller: ended by SIGSEGV at step 299, before the flight was over"),
+])
+def test_the_verdict_names_what_a_law_did_in_one_process(check, tmp_path, controller, expected):
+    (tmp_path / "late.py").write_text("import time\ntime.sleep(1000)\n")
+    code, flights, said = check(controller, "--placement", "in-process")
+    assert code == 1 and flights[0]["problems"][0].startswith(expected), said
+
+
+def test_a_library_that_hangs_is_named_with_its_step(check, tmp_path):
+    source = (ROOT / "examples/ci/my_law.c").read_text()
+    begin = "const sls_controller_setup* setup = controller;\n"
+    assert source.count(begin) == 1
+    (tmp_path / "hang.c").write_text("#include <unistd.h>\n" + source.replace(
+        begin, begin + "  while (now->step == 300) pause();\n"))
+    (tmp_path / "include").mkdir()
+    (tmp_path / "include/sls").symlink_to(ROOT / "control_client/laws/shared_library")
+    subprocess.run(["gcc", "-fPIC", "-shared", "-Iinclude", "-o", "hang.so", "hang.c"], cwd=tmp_path, check=True)
+    code, flights, said = check("library: hang.so, silent_s: 4", "--placement", "in-process,shm", "--jobs", "2")
+    assert code == 1 and [one["verdict"] for one in flights] == ["not held"] * 2, said
+    for one in flights:
+        assert re.match(r"controller: expected an answer within 4 s, got none( after step \d+)?: \w+: warning: .*hang.so: "
+                        r"answer, vehicle 0, step 300: has not returned for 2 s", one["problems"][0]), one["problems"]
+
+
+@pytest.mark.parametrize("controller, expected", [
+    ("command: [./docker, run, image]", "controller: ended with 125 at step 0, before the flight was over: docker: Cannot "
+     "connect"),
+    ("python: law.py:none", "controller: ended with 2 at step 0, before the flight was over: controller: "),
+])
+def test_a_controller_that_cannot_be_used_is_a_mistake(check, tmp_path, controller, expected):
+    (tmp_path / "docker").write_text("#!/bin/sh\necho docker: Cannot connect; echo Run docker --help; exit 125\n")
+    (tmp_path / "docker").chmod(0o755)
+    code, flights, said = check(controller, "--placement", "shm")
+    assert code == 2 and flights[0]["verdict"] == "unusable" and flights[0]["problems"][0].startswith(expected), said
 
 
 def test_a_controller_whose_port_is_in_use_is_quoted(check):
