@@ -125,6 +125,20 @@ class DockerTest : public ::testing::Test {
     return folder / "slow.yaml";
   }
 
+  /// A copy of examples/ci with its law, as a user has it.
+  fs::path make_ci_example() const {
+    const fs::path ci = folder / "ci";
+    fs::copy(std::string(SLS_SOURCE_DIR) + "/examples/ci", ci);
+    const Outcome made =
+        run_shell("cd " + ci.string() + " && mkdir build include && ln -s " + SLS_SOURCE_DIR +
+                  "/control_client/laws/shared_library include/sls && gcc -O2 "
+                  "-fPIC -shared -I include -o build/my_law.so my_law.c");
+    EXPECT_EQ(made.code, 0) << made.output;
+    return ci;
+  }
+
+  static std::string user() { return std::to_string(geteuid()) + ":" + std::to_string(getegid()); }
+
   TemporaryFolder folder;
 
  private:
@@ -212,15 +226,11 @@ TEST_F(DockerTest, ADemoEndsWithTheExitCodeOfTheProgramThatFailed) {
 }
 
 TEST_F(DockerTest, TheComposeFileOfTheCiExampleFliesWhatItsCheckExpects) {
-  const fs::path ci = folder / "ci";
-  fs::copy(std::string(SLS_SOURCE_DIR) + "/examples/ci", ci);
+  const fs::path ci = make_ci_example();
   const std::string project = note_project("sls-test-ci-", getpid());
-  const std::string user = std::to_string(geteuid()) + ":" + std::to_string(getegid());
   const std::string lines = "set -e; cd " + ci.string() +
-                            "; mkdir -p build include recording; ln -s " + SLS_SOURCE_DIR +
-                            "/control_client/laws/shared_library include/sls; " +
-                            "gcc -O2 -fPIC -shared -I include -o build/my_law.so my_law.c; " +
-                            "export MY_IMAGE=sls-test-ci SLS_USER=" + user + kCompose + project;
+                            "; mkdir recording; export MY_IMAGE=sls-test-ci SLS_USER=" + user() +
+                            kCompose + project;
   const Outcome up = run_shell(lines + " up --build");
   EXPECT_EQ(up.code, 0) << up.output;
   const Outcome verdict = run_command(
@@ -229,6 +239,36 @@ TEST_F(DockerTest, TheComposeFileOfTheCiExampleFliesWhatItsCheckExpects) {
   EXPECT_EQ(run_shell("cd " + ci.string() + kCompose + project + " down").code, 0);
   run_shell("docker image rm sls-test-ci");
   expect_nothing_left(project);
+}
+
+/// The command is that of docs/testing-your-controller.md.
+TEST_F(DockerTest, ACheckFliesAControllerInAContainerAndRefusesAMissingImage) {
+  const fs::path ci = make_ci_example();
+  const auto check = [&](const std::string& image) {
+    write_bytes(ci / "check.yaml",
+                "scenario: scenario.yaml\nplacements: [shm, udp]\n"
+                "participants:\n  controller:\n    command:\n      [docker, run, --rm, --init, "
+                "--network, host, --ipc, host, --user, '" +
+                    user() + "', -v, '" + ci.string() + ":/flight:ro', -v, '{qos}:{qos}:ro', " +
+                    image +
+                    ", control_client, --scenario,\n       /flight/scenario.yaml, --qos, '{qos}', "
+                    "--domain, '{domain}']\n"
+                    "expect:\n  - { measure: load_error_end_m, stage: 0, max: 0.01 }\n");
+    return run_command({kLauncher, "--no-install", "check", ci / "check.yaml"});
+  };
+  const char* image = std::getenv("SLS_IMAGE");
+  const Outcome held = check(image ? image : "sls");
+  EXPECT_EQ(held.code, 0) << held.output;
+  EXPECT_NE(held.output.find("2 flights: 2 held; the flights of each check have equal bytes"),
+            std::string::npos)
+      << held.output;
+  const Outcome missing = check("sls-no-such-image");
+  EXPECT_EQ(missing.code, 2) << missing.output;
+  EXPECT_NE(missing.output.find("controller: ended with 125 at step 0, before the flight was over: "
+                                "Unable to find image"),
+            std::string::npos)
+      << missing.output;
+  EXPECT_EQ(run_shell("docker ps --all --quiet --filter volume=" + ci.string()).output, "");
 }
 
 TEST_F(DockerTest, ServicesAreHealthyWhileTheyFlyAndRunAsTheUserTheyWereTold) {

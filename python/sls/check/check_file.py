@@ -6,7 +6,7 @@ import os
 import re
 import shutil
 import signal
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -19,19 +19,23 @@ from sls.campaign.yaml_nodes import Place, parse_yaml, read_bytes
 from sls.check.faults import PLACEMENTS, Fault, list_faults
 from sls.errors import ConfigError
 from sls.launcher.place import list_names, suggest
-from sls.measures import MEASURES
+from sls.measures import AXES, MEASURES
 from sls.scenario import ROOT, find_scenario, load_scenario
 
 if TYPE_CHECKING:
     from _sls_core import Scenario
 
 MOST_BYTES = 1_000_000
-KINDS = ("outcome", "measure", "value", "event", "certificate")
+KEYS = {"outcome": ("reason",), "measure": ("min", "max", "vehicle"),  # and those of the measure
+        "value": ("min", "max", "stage", "window_s", "vehicle", "over"), "event": ("min", "max"), "certificate": ()}
+KINDS = tuple(KEYS)
 OUTCOMES = ("finished", "failed")
 EVENTS = ("take_over", "fail_safe", "late_step", "refused_answer")
 OF_ANSWERS = ("late_steps", "answer_age_max_ms")  # measures that are events rather than motion
 OVER = ("max", "min", "mean", "rms", "end")
-AXES = ("x", "y", "z")
+CONTROLLERS = {"command": ("env", "ready", "ready_s", "silent_s", "stop"), "python": ("ready_s", "silent_s"),
+               "library": ("silent_s",)}
+STOPS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGKILL")
 UNKNOWN = "unknown"  # of a certificate: --update writes it
 DEFAULT_LIMIT_S, DEFAULT_SILENT_S, DEFAULT_READY_S = 300.0, 20.0, 60.0
 
@@ -77,7 +81,6 @@ class Participant:
     """The process under test, or the law that flies in one of ours."""
 
     place: Place
-    name: str
     kind: str  # command, python or library
     words: tuple[str, ...]
     folder: Path  # in which it runs
@@ -139,7 +142,7 @@ def load_check(file: Path, library: Path | None = None) -> Check:
     if library:
         if not library.is_file():
             raise ConfigError(f"--library: expected a shared library, got no such file: {library}")
-        controller = Participant(root, "controller", "library", (str(library.resolve()),), file.parent.resolve())
+        controller = Participant(root, "library", (str(library.resolve()),), file.parent.resolve())
     if controller and controller.kind == "library":
         scenario = put_library(controller, scenario, scenario_file)
     check = Check(file, file.stem, place, scenario_file, scenario, (), controller)
@@ -180,47 +183,53 @@ def read_positive(place: Place, unit: str) -> float:
 
 
 def read_expectation(place: Place, scenario: "Scenario") -> Expectation:
-    known = ("min", "max", "stage", "window_s", "vehicle", "over", "axis", "within_m", "for_s", "reason", "because")
+    readers: dict[str, Callable[[Place], Any]] = {
+        "stage": lambda at: read_stage(at, scenario), "window_s": lambda at: read_window(at, scenario),
+        "vehicle": lambda at: at.read_whole(0, len(scenario.vehicles) - 1),
+        "over": lambda at: read_word(at, OVER), "axis": lambda at: read_word(at, AXES),
+        "within_m": lambda at: read_positive(at, "m"), "for_s": lambda at: read_positive(at, "s"),
+        "reason": lambda at: at.read_text("a text"), "because": lambda at: at.read_text("a text")}
+    known = ("min", "max", *readers)
     values = place.read_map("an expectation, such as { measure: load_error_rms_m, max: 0.02 }", (*KINDS, *known))
-    kinds = [kind for kind in KINDS if kind in values]
-    if len(kinds) != 1:
-        place.fail(f"expected exactly one of {', '.join(KINDS)}, got {' and '.join(kinds) or 'none'}")
-    kind, what = kinds[0], values[kinds[0]]
-    named = what.read_text(f"a text: {describe_kind(kind)}")
-    made = Expectation(place, kind, named)
-    allowed: tuple[str, ...] = ()
-    if kind == "outcome":
-        allowed = ("reason",)
-        check_word(what, named, OUTCOMES)
-    elif kind == "certificate":
-        if named != UNKNOWN and not re.fullmatch("[0-9a-f]{64}", named):
-            what.fail_expected(f"64 hexadecimal digits, or {UNKNOWN} (./sls check --update writes them)")
-    elif kind == "event":
-        allowed = ("min", "max")
-        check_word(what, named, EVENTS)
-    elif kind == "measure":
+    kind = find_one(place, values, KINDS)
+    made = read_kind(place, kind, values[kind])
+    allowed = (*KEYS[kind], "because", *(MEASURES[made.what].options if kind == "measure" else ()))
+    for key in values:
+        if key in known and key not in allowed:
+            values[key].fail(f"expected no such key beside {kind}: {made.what}, got one")
+    low, high = (float(values[key].read_number(f"a number ({made.unit or 'no unit'})")) if key in values else None
+                 for key in ("min", "max"))
+    if "max" in KEYS[kind] and low is None and high is None:
+        place.fail("expected a bound, min or max, got none")
+    if low is not None and high is not None and low > high:
+        values["max"].fail(f"expected at least min ({low:g}), got {high:g}")
+    read = {key: readers[key](value) for key, value in values.items() if key in readers}
+    options = {key: read.pop(key) for key in ("axis", "within_m", "for_s") if key in read}
+    return replace(made, low=low, high=high, options=options, **read)
+
+
+def read_kind(place: Place, kind: str, what: Place) -> Expectation:
+    """The expectation without its further keys."""
+    if kind in ("outcome", "event"):
+        return Expectation(place, kind, read_word(what, OUTCOMES if kind == "outcome" else EVENTS))
+    named = what.read_text("a text in quotes")
+    if kind == "certificate" and named != UNKNOWN and not re.fullmatch("[0-9a-f]{64}", named):
+        what.fail_expected(f"64 hexadecimal digits, or {UNKNOWN} (./sls check --update writes them)")
+    if kind == "measure":
         check_measure(what, named)
-        allowed = ("min", "max", "vehicle", *MEASURES[named].options)
-    else:
-        allowed = ("min", "max", "stage", "window_s", "vehicle", "over")
-        try:
-            made = replace(made, expression=Expression(named))
-        except ExpressionError as error:
-            what.fail(str(error))
-    for key, value in values.items():
-        if key in known and key not in (*allowed, "because"):
-            value.fail(f"expected no such key beside {kind}: {named}, got one")
-    return replace(made, **read_options(place, values, made, scenario))
+    if kind != "value":
+        return Expectation(place, kind, named)
+    try:
+        return Expectation(place, kind, named, expression=Expression(named))
+    except ExpressionError as error:
+        what.fail(str(error))
 
 
-def describe_kind(kind: str) -> str:
-    return {"outcome": " or ".join(OUTCOMES), "event": ", ".join(EVENTS), "measure": "the name of a measure",
-            "value": "arithmetic with columns", "certificate": "64 hexadecimal digits"}[kind]
-
-
-def check_word(place: Place, word: str, known: tuple[str, ...]) -> None:
+def read_word(place: Place, known: tuple[str, ...]) -> str:
+    word = place.read_text(f"one of {', '.join(known)}")
     if word not in known:
         place.fail_expected(f"one of {', '.join(known)}")
+    return word
 
 
 def check_measure(place: Place, name: str) -> None:
@@ -233,39 +242,6 @@ def check_measure(place: Place, name: str) -> None:
     near = difflib.get_close_matches(name, MEASURES, 1)
     place.fail(f"expected a measure, got {name}"
                + (f"; did you mean '{near[0]}'?" if near else f"; known are {', '.join(MEASURES)}"))
-
-
-def read_options(place: Place, values: dict[str, Place], made: Expectation, scenario: "Scenario") -> dict[str, Any]:
-    read: dict[str, Any] = {}
-    for key, name in (("min", "low"), ("max", "high")):
-        if key in values:
-            unit = made.unit or "no unit"
-            read[name] = float(values[key].read_number(f"a number ({unit})"))
-    if made.kind in ("measure", "value", "event") and not read:
-        place.fail("expected a bound, min or max, got none")
-    if len(read) == 2 and read["low"] > read["high"]:
-        values["max"].fail(f"expected at least min ({read['low']:g}), got {read['high']:g}")
-    if "stage" in values:
-        read["stage"] = read_stage(values["stage"], scenario)
-    if "window_s" in values:
-        read["window_s"] = read_window(values["window_s"], scenario)
-    if "vehicle" in values:
-        read["vehicle"] = values["vehicle"].read_whole(0, len(scenario.vehicles) - 1)
-    if "over" in values:
-        read["over"] = values["over"].read_text(f"one of {', '.join(OVER)}")
-        check_word(values["over"], read["over"], OVER)
-    options: dict[str, Any] = {}
-    if "axis" in values:
-        options["axis"] = values["axis"].read_text(f"one of {', '.join(AXES)}")
-        check_word(values["axis"], options["axis"], AXES)
-    for key, unit in (("within_m", "m"), ("for_s", "s")):
-        if key in values:
-            options[key] = read_positive(values[key], unit)
-    read["options"] = options
-    for key in ("reason", "because"):
-        if key in values:
-            read[key] = values[key].read_text("a text")
-    return read
 
 
 def read_stage(place: Place, scenario: "Scenario") -> int:
@@ -301,44 +277,45 @@ def read_participants(place: Place) -> Participant | None:
     if "controller" not in values:
         return None
     own = values["controller"]
-    known = ("command", "python", "library", "env", "ready", "ready_s", "silent_s", "stop")
-    keys = own.read_map("a controller: command, python or library", known)
-    kinds = [kind for kind in known[:3] if kind in keys]
-    if len(kinds) != 1:
-        own.fail(f"expected exactly one of {', '.join(known[:3])}, got {' and '.join(kinds) or 'none'}")
-    kind, what = kinds[0], keys[kinds[0]]
+    readers: dict[str, Callable[[Place], Any]] = {
+        "env": lambda at: {name: value.read_text("a text in quotes") for name, value in at.read_map("variables").items()},
+        "ready": lambda at: at.read_text("a text of its output"), "ready_s": lambda at: read_positive(at, "seconds"),
+        "silent_s": lambda at: read_positive(at, "seconds"),
+        "stop": lambda at: signal.Signals[read_word(at, STOPS)]}
+    keys = own.read_map("a controller: command, python or library", (*CONTROLLERS, *readers))
+    kind = find_one(own, keys, CONTROLLERS)
     folder = own.file.parent.resolve()
-    if kind == "command":
-        if not what.is_list or not what.node.value:
-            what.fail_expected("a list of words: program and arguments")
-        words = [item.read_text("a word in quotes") for item in what.list_items()]
-        if not (os.access(folder / words[0], os.X_OK) if "/" in words[0] else shutil.which(words[0])):
-            what.list_items()[0].fail_expected("a program that exists")
-    else:
-        words = [what.read_text("FILE.py:NAME" if kind == "python" else "the path of a library")]
-        path = folder / words[0].rpartition(":")[0] if kind == "python" else folder / words[0]
-        if kind == "python" and not words[0].rpartition(":")[2].isidentifier() or not path.is_file():
-            what.fail_expected("FILE.py:NAME, a file and a law in it" if kind == "python" else "a library's file")
-        words = [f"{path}:{words[0].rpartition(':')[2]}" if kind == "python" else str(path)]
-    made = Participant(own, "controller", kind, tuple(words), folder)
+    words = read_words(keys[kind], kind, folder)
+    for key in keys:
+        if key not in (kind, *CONTROLLERS[kind]):
+            keys[key].fail(f"expected no such key beside {kind}, got one")
+    more = {key: readers[key](value) for key, value in keys.items() if key != kind}
+    return Participant(own, kind, words, folder, **more)
+
+
+def find_one(place: Place, values: Mapping[str, Place], kinds: Iterable[str]) -> str:
+    """The one of these keys that is there."""
+    found = [kind for kind in kinds if kind in values]
+    if len(found) != 1:
+        place.fail(f"expected exactly one of {', '.join(kinds)}, got {' and '.join(found) or 'none'}")
+    return found[0]
+
+
+def read_words(what: Place, kind: str, folder: Path) -> tuple[str, ...]:
+    """Program and arguments of a command, FILE.py:NAME of a law in Python, or the path of a library."""
     if kind != "command":
-        for key in keys:
-            if key not in (kind, "silent_s", *(["ready_s"] if kind == "python" else [])):
-                keys[key].fail(f"expected no such key beside {kind}, got one")
-    if "env" in keys:
-        env = {name: value.read_text("a text in quotes") for name, value in keys["env"].read_map("variables").items()}
-        made = replace(made, env=env)
-    if "ready" in keys:
-        made = replace(made, ready=keys["ready"].read_text("a text of its output"))
-    for key in ("ready_s", "silent_s"):
-        if key in keys:
-            made = replace(made, **{key: read_positive(keys[key], "seconds")})
-    if "stop" in keys:
-        word = keys["stop"].read_text("a signal")
-        if word not in ("SIGINT", "SIGTERM", "SIGHUP", "SIGKILL"):
-            keys["stop"].fail_expected("SIGINT, SIGTERM, SIGHUP or SIGKILL")
-        made = replace(made, stop=signal.Signals[word])
-    return made
+        expected = "FILE.py:NAME, a file and a law in it" if kind == "python" else "a library's file"
+        text = what.read_text(expected)
+        file, colon, name = text.rpartition(":") if kind == "python" else (text, "", "law")
+        if not name.isidentifier() or not (folder / file).is_file():
+            what.fail_expected(expected)
+        return (f"{folder / file}{colon}{name if colon else ''}",)
+    if not what.is_list or not what.node.value:
+        what.fail_expected("a list of words: program and arguments")
+    words = tuple(item.read_text("a word in quotes") for item in what.list_items())
+    if not (os.access(folder / words[0], os.X_OK) if "/" in words[0] else shutil.which(words[0])):
+        what.list_items()[0].fail_expected("a program that exists")
+    return words
 
 
 def put_library(controller: Participant, scenario: "Scenario", file: Path) -> "Scenario":
@@ -360,8 +337,7 @@ def read_placements(place: Place | None, check: Check) -> tuple[str, ...]:
         place.fail_expected(f"a list of {', '.join(PLACEMENTS)}")
     names = []
     for item in place.list_items():
-        name = item.read_text("a placement")
-        check_word(item, name, PLACEMENTS)
+        name = read_word(item, PLACEMENTS)
         if refusal := find_refusal(check, name):
             item.fail(f"expected {refusal}, got {name}")
         names.append(name)

@@ -1,5 +1,6 @@
 """The first difference of two recordings: step, vehicle, column, both values, and the topic it came from."""
 
+from itertools import zip_longest
 from pathlib import Path
 
 from sls.csv_tables import read_records
@@ -22,19 +23,15 @@ def find_difference(a: Path, b: Path) -> str:
 
 def find_event_difference(a: Recording, b: Recording) -> str:
     """What equal steps can hide: phases, take-overs and refused answers, as far as both recordings have them."""
-    both = [list_changes(recording) for recording in (a, b)]
-    for one, other in zip(*both):
-        if one != other:
-            (step, name, value), (other_step, other_name, other_value) = one, other
-            if (step, name) == (other_step, other_name):
-                return f"status.csv, step {step}, {name}: {value} in A, {other_value} in B (topic sls/status)"
-            is_in_a = step <= other_step
-            step, name, value = one if is_in_a else other
-            return f"status.csv, step {step}, {name}: {value} in {'A' if is_in_a else 'B'} alone (topic sls/status)"
-    if len(both[0]) != len(both[1]):
-        longer = 0 if len(both[0]) > len(both[1]) else 1
-        step, name, value = both[longer][min(map(len, both))]
-        return f"status.csv, step {step}, {name}: {value} in {'AB'[longer]} alone (topic sls/status)"
+    for one, other in zip_longest(list_changes(a), list_changes(b)):
+        if one == other:
+            continue
+        if one and other and one[:2] == other[:2]:
+            step, name, value = one
+            return f"status.csv, step {step}, {name}: {value} in A, {other[2]} in B (topic sls/status)"
+        is_in_a = other is None or one is not None and one[0] <= other[0]
+        step, name, value = one if is_in_a else other
+        return f"status.csv, step {step}, {name}: {value} in {'A' if is_in_a else 'B'} alone (topic sls/status)"
     return ""
 
 

@@ -77,7 +77,7 @@ MISTAKES = [
     ("participants: { controller: { library: none.so } }", "library: expected a library's file, got none.so"),
     ("participants: { controller: { library: short.so, env: { A: b } } }", "library: expected a library's file"),
     ("participants: { controller: { command: [sh], env: { A: 1 } } }", "env.A: expected a text in quotes, got 1"),
-    ("participants: { controller: { command: [sh], stop: SIGWHAT } }", "stop: expected SIGINT, SIGTERM"),
+    ("participants: { controller: { command: [sh], stop: SIGWHAT } }", "stop: expected one of SIGINT, SIGTERM"),
     ("participants: { controller: { command: [sh], ready_s: no } }", "ready_s: expected a number of seconds > 0"),
     ("participants: { controller: { command: [sh] } }\nplacements: [shm, in-process]",
      ":4: placements[1]: expected shm, udp or hosts, because its controller is a command, got in-process"),
