@@ -47,15 +47,19 @@ class Cables {
   }
 
   auto calc_accelerations(const Eigen::VectorXd& load, const VectorRows& p_WQ,
-                          const VectorRows& v_WQ, const VectorRows& f_Q_W) const {
-    const mechanics::Motion motion = to_motion(load, p_WQ, v_WQ);
+                          const VectorRows& v_WQ, const VectorRows& f_Q_W,
+                          const std::vector<double>& length_rate,
+                          const std::vector<double>& length_acceleration) const {
+    const mechanics::Motion motion = to_motion(load, p_WQ, v_WQ, length_rate);
     const mechanics::Geometry geometry = find_geometry(motion);
     mechanics::Actions actions;
-    for (std::size_t i = 0; i < system_.count; ++i)
+    for (std::size_t i = 0; i < system_.count; ++i) {
       actions.f_Q_W[i] = f_Q_W.row(static_cast<Eigen::Index>(i));
+      actions.length_acceleration[i] = length_acceleration[i];
+    }
     // Ends that approach faster than rounding leave their length.
-    const mechanics::Members candidates =
-        mechanics::find_candidates(system_, geometry, tolerance_, tolerance_);
+    const mechanics::Members candidates = mechanics::find_candidates(
+        mechanics::Members::all(system_.count), geometry, tolerance_, tolerance_);
     const mechanics::Accelerations found =
         mechanics::calc_accelerations(system_, motion, geometry, actions, candidates);
     std::vector<bool> taut;
@@ -64,9 +68,9 @@ class Cables {
     return std::tuple(found.rate.v_WL, turn, to_rows(found.rate), to_list(found.tension), taut);
   }
 
-  auto calc_impact(const Eigen::VectorXd& load, const VectorRows& p_WQ,
-                   const VectorRows& v_WQ) const {
-    mechanics::Motion motion = to_motion(load, p_WQ, v_WQ);
+  auto calc_impact(const Eigen::VectorXd& load, const VectorRows& p_WQ, const VectorRows& v_WQ,
+                   const std::vector<double>& length_rate) const {
+    mechanics::Motion motion = to_motion(load, p_WQ, v_WQ, length_rate);
     const mechanics::Geometry geometry = find_geometry(motion);
     mechanics::Members at_length;
     for (std::size_t i = 0; i < system_.count; ++i)
@@ -78,7 +82,8 @@ class Cables {
 
  private:
   mechanics::Motion to_motion(const Eigen::VectorXd& load, const VectorRows& p_WQ,
-                              const VectorRows& v_WQ) const {
+                              const VectorRows& v_WQ,
+                              const std::vector<double>& length_rate) const {
     mechanics::Motion motion;
     motion.p_WL = load.segment<3>(0);
     motion.v_WL = load.segment<3>(3);
@@ -86,7 +91,7 @@ class Cables {
     motion.w_WL_L = load.segment<3>(10);
     for (std::size_t i = 0; i < system_.count; ++i) {
       const auto row = static_cast<Eigen::Index>(i);
-      motion.vehicles[i] = {p_WQ.row(row), v_WQ.row(row), length_[i], 0.0};
+      motion.vehicles[i] = {p_WQ.row(row), v_WQ.row(row), length_[i], length_rate[i]};
     }
     return motion;
   }
@@ -129,8 +134,10 @@ void add_cables(py::module_& module) {
            py::arg("vehicle_mass"), py::arg("length"), py::arg("attachment"), py::arg("load_mass"),
            py::arg("inertia"), py::arg("gravity"), py::arg("restitution"), py::arg("tolerance"))
       .def("accelerations", &Cables::calc_accelerations, py::arg("load"), py::arg("p_WQ"),
-           py::arg("v_WQ"), py::arg("f_Q_W"))
-      .def("impact", &Cables::calc_impact, py::arg("load"), py::arg("p_WQ"), py::arg("v_WQ"));
+           py::arg("v_WQ"), py::arg("f_Q_W"), py::arg("length_rate"),
+           py::arg("length_acceleration"))
+      .def("impact", &Cables::calc_impact, py::arg("load"), py::arg("p_WQ"), py::arg("v_WQ"),
+           py::arg("length_rate"));
 }
 
 }  // namespace sls::python

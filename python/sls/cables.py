@@ -103,19 +103,30 @@ class System:
         self._core = load_core().Cables(mass, length, attachment, float(load_mass_kg), inertia, gravity,
                                         float(restitution), float(length_tolerance_m))
 
-    def accelerations(self, load: Any, vehicles: Any, forces: ArrayLike) -> Accelerations:
+    def accelerations(self, load: Any, vehicles: Any, forces: ArrayLike, *, length_rate_m_s: ArrayLike = 0.0,
+                      length_acceleration_m_s2: ArrayLike = 0.0) -> Accelerations:
         """Accelerations under the `forces` on the vehicles (N × 3, N, world axes, without gravity).
 
         `load` is a Load, a tuple in its order or a mapping with its names; `vehicles` likewise. A cable at its length
         whose ends approach, by more than `length_tolerance_m` a second, leaves it and is slack. If they move apart,
-        call `impact` first: here such a cable counts as one that just keeps its length."""
+        call `impact` first: here such a cable counts as one that just keeps its length. A winch changes the lengths by
+        `length_rate_m_s` and `length_acceleration_m_s2`, of each cable or of all."""
         return Accelerations(*map(np.asarray, self._core.accelerations(
-            *self._to_motion(load, vehicles), _to_array("forces", forces, (self.count, 3)))))
+            *self._to_motion(load, vehicles), _to_array("forces", forces, (self.count, 3)),
+            self._to_each("length_rate_m_s", length_rate_m_s),
+            self._to_each("length_acceleration_m_s2", length_acceleration_m_s2))))
 
-    def impact(self, load: Any, vehicles: Any) -> Impact:
+    def impact(self, load: Any, vehicles: Any, *, length_rate_m_s: ArrayLike = 0.0) -> Impact:
         """Velocities after all cables at their length have stopped what moved apart, together, with the least
-        impulses: a cable pulls or its ends approach. Velocities stay if nothing moved apart."""
-        return Impact(*map(np.asarray, self._core.impact(*self._to_motion(load, vehicles))))
+        impulses: a cable pulls or its ends approach. Velocities stay if nothing moved apart. Ends move apart if they do
+        so faster than their cable lengthens by `length_rate_m_s`."""
+        return Impact(*map(np.asarray, self._core.impact(
+            *self._to_motion(load, vehicles), self._to_each("length_rate_m_s", length_rate_m_s))))
+
+    def _to_each(self, name: str, values: ArrayLike) -> np.ndarray:
+        if np.ndim(values) == 0:
+            return np.full(self.count, float(_to_array(name, values, ())))
+        return _to_array(name, values, (self.count,))
 
     def _to_motion(self, load: Any, vehicles: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         position, velocity, quaternion, rates = _to_tuple("load", load, Load)

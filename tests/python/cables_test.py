@@ -66,6 +66,22 @@ def test_an_impact_keeps_momentum_and_stops_the_end_of_the_cable():
     assert not same.impulse_n_s.any() and same.vehicle_velocity[0, 2] == 1.0
 
 
+def test_a_winch_changes_length_and_tension():
+    # One vertical cable between 0.5 kg and 0.3 kg: the ends accelerate apart by l̈, and approach by the rate of l.
+    system = System(vehicle_mass_kg=0.5, cable_length_m=1, attachment_m=[0, 0, 0], load_mass_kg=0.3, gravity_m_s2=G)
+    reduced = 0.5 * 0.3 / 0.8
+    vehicles = Vehicles([[0, 0, -1]], [[0, 0, 0.4]])
+    got = system.accelerations(REST, vehicles, [[0, 0, -6]], length_rate_m_s=-0.4, length_acceleration_m_s2=[-2])
+    assert got.tension_n == pytest.approx([reduced * (6 / 0.5 + 2)], rel=1e-14)
+    assert got.taut.tolist() == [True]
+    assert not system.accelerations(REST, vehicles, [[0, 0, -6]]).taut.any()
+    hit = system.impact(REST, vehicles, length_rate_m_s=[-1.0])
+    assert hit.impulse_n_s == pytest.approx([reduced * 0.6], rel=1e-14)
+    assert not system.impact(REST, vehicles).impulse_n_s.any()
+    with pytest.raises(sls.InputError, match=r"length_rate_m_s: expected 1, got 2"):
+        system.impact(REST, vehicles, length_rate_m_s=[1, 2])
+
+
 def test_accelerations_do_not_depend_on_the_world_axes_without_gravity():
     # The whole scene turned by a quaternion of any length, without gravity.
     keys = {"vehicle_mass_kg": [0.5, 0.7], "cable_length_m": [1, 1.2], "attachment_m": [[0.2, 0.1, 0], [-0.2, 0, 0.1]],

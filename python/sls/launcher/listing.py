@@ -16,7 +16,7 @@ LAWS = {
 PLANTS = {
     "slung_load": "point mass, massless rod, point load, by Simbody; the default",
     "analytic": "the same by its equations, written independently",
-    "cables": "up to 16 vehicles on one load, cables that go slack",
+    "cables": "up to 16 vehicles on one load, cables that go slack, winches, ground",
     "multirotor": "rotors, a body that tilts, an autopilot",
     "PATH.so": "an own plant: examples/my_plant",
 }

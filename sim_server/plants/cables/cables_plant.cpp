@@ -1,14 +1,19 @@
 #include "sim_server/plants/cables/cables_plant.hpp"
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <utility>
+
+#include "common/config/numbers.hpp"
 
 namespace sls::sim {
 namespace {
 
 constexpr int kMostRemarks = 20;  // of a vehicle
+constexpr const char* kNoneCarries = "; no cable carries the load";
+constexpr double kSameTime = 1e-12;  // s: rounding of a time in a scenario
 
 const std::vector<PlantSetup::Vehicle>& check_vehicles(const PlantSetup& setup) {
   const std::string defect =
@@ -33,10 +38,13 @@ CablesPlant::CablesPlant(const PlantSetup& setup, const cables::Start& start)
     : system_(start.system),
       step_s_(1e-9 * static_cast<double>(setup.plant.step_ns)),
       motion_(start.system, start.motion),
+      phases_(setup.vehicles.size()),
       remarks_(setup.vehicles.size()),
       remark_counts_(setup.vehicles.size()) {
   actions_.air = setup.plant.air;
   actions_.disturbance_W = setup.plant.disturbance_W;
+  plan(setup.plant.own.get<CablesKeys>());
+  signals_ = list_signals();
   for (std::size_t i = 0; i < system_.count; ++i) {
     measurements_.push_back(measure(i));
     check_finite(measurements_[i], 0);
@@ -49,9 +57,7 @@ void CablesPlant::advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_
     actions_.f_Q_W[i] = f_Q_W[i];
   }
   for (std::int64_t k = 0; k < steps; ++k) {
-    events_.clear();
-    motion_.step(actions_, step_s_, events_);
-    for (const cables::Event& event : events_) note(event);
+    fly_step();
     ++steps_;
   }
   for (std::size_t i = 0; i < system_.count; ++i) {
@@ -59,6 +65,74 @@ void CablesPlant::advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_
     check_finite(measured, steps_);
     measurements_[i] = measured;
   }
+}
+
+void CablesPlant::plan(const CablesKeys& keys) {
+  for (std::size_t i = 0; i < keys.cables.size(); ++i) {
+    const CableKeys& cable = keys.cables[i];
+    if (cable.winch) {
+      has_winch_ = true;
+      double length = motion_.motion().vehicles[i].length;
+      for (const WinchStageKeys& stage : cable.winch->stages) {
+        const std::vector<cables::WinchPhase> phases = cables::make_phases(stage, length);
+        for (const cables::WinchPhase& phase : phases) {
+          std::string remark;
+          if (phase.start == phases.back().start)
+            remark = "winch stops at " + config::to_text(stage.length) + " m";
+          else if (phase.start == phases.front().start)
+            remark = "winch starts towards " + config::to_text(stage.length) + " m";
+          changes_.push_back({phase.start, i, phase, remark});
+        }
+        length = stage.length;
+      }
+    }
+    if (cable.release_ns) {
+      has_release_ = true;
+      changes_.push_back({1e-9 * static_cast<double>(*cable.release_ns), i, {}, "cable released"});
+    }
+  }
+  std::stable_sort(changes_.begin(), changes_.end(),
+                   [](const Change& a, const Change& b) { return a.time < b.time; });
+}
+
+/// A step of the plant, in parts where something changes inside it.
+void CablesPlant::fly_step() {
+  const double start = static_cast<double>(steps_) * step_s_;
+  for (double flown = 0.0; flown < step_s_;) {
+    double until = step_s_;
+    for (; next_change_ < changes_.size(); ++next_change_) {
+      const Change& change = changes_[next_change_];
+      if (change.time > start + flown + kSameTime) {
+        if (change.time < start + step_s_ - kSameTime) until = change.time - start;
+        break;
+      }
+      apply(change);
+    }
+    for (std::size_t i = 0; i < phases_.size(); ++i) {
+      if (!phases_[i]) continue;
+      const cables::WinchLength now = cables::calc_length(*phases_[i], start + flown);
+      motion_.set_length(i, now.length, now.rate);
+    }
+    events_.clear();
+    motion_.step(actions_, until - flown, events_);
+    for (cables::Event& event : events_) {
+      event.time += flown;
+      note(event);
+    }
+    flown = until;
+  }
+}
+
+void CablesPlant::apply(const Change& change) {
+  if (change.phase) {
+    phases_[change.cable] = change.phase;
+    actions_.length_acceleration[change.cable] = change.phase->acceleration;
+  } else {
+    motion_.cut(change.cable);
+  }
+  if (!change.remark.empty())
+    remark(change.cable, change.remark + " at " + describe_time(change.time) +
+                             (!change.phase && motion_.taut().empty() ? kNoneCarries : ""));
 }
 
 model::Measurement CablesPlant::measure(std::size_t vehicle) const {
@@ -78,49 +152,76 @@ model::Measurement CablesPlant::measure(std::size_t vehicle) const {
   state.v_WL = motion.v_WL + v_LE_W;
   const Eigen::Vector3d d_W = state.p_WL - state.p_WQ, drift_W = state.v_WL - state.v_WQ;
   const double distance = std::sqrt(d_W.squaredNorm());
-  if (distance > 0.0) {  // else the cable has no direction, and hangs
+  if (distance > 0.0 && !motion_.is_cut(vehicle)) {  // else the cable has no end there, and hangs
     const Eigen::Vector3d n_W = d_W / distance;
     state.rod = model::to_angles({n_W, (drift_W - n_W * n_W.dot(drift_W)) / distance});
   }
   model::Measurement measured(state);
-  measured.signals.resize(10);
-  measured.signals << motion_.tension()[vehicle], own.length, motion_.taut().has(vehicle) ? 1 : 0,
-      q[0], q[1], q[2], q[3], motion.w_WL_L.x(), motion.w_WL_L.y(), motion.w_WL_L.z();
+  const double tension = motion_.tension()[vehicle];
+  const bool is_taut = motion_.taut().has(vehicle);
+  Eigen::Index count = 0;
+  const auto add = [&](double number) { measured.signals[count++] = number; };
+  measured.signals.resize(static_cast<Eigen::Index>(signals_.size()));
+  for (const double number : {tension, own.length, is_taut ? 1.0 : 0.0, q[0], q[1], q[2], q[3],
+                              motion.w_WL_L.x(), motion.w_WL_L.y(), motion.w_WL_L.z()})
+    add(number);
+  if (has_winch_) add(own.length_rate);
+  if (has_release_) add(motion_.is_cut(vehicle));
+  if (system_.ground_z_W)
+    for (const std::size_t body : {cables::kLoad, vehicle}) add(motion_.standing().has(body));
   return measured;
 }
 
-std::vector<Signal> CablesPlant::signals() const {
-  return {{"cable_tension_n", "N"},
-          {"cable_length_m", "m"},
-          {"cable_taut", ""},
-          {"load_att_w", ""},
-          {"load_att_x", ""},
-          {"load_att_y", ""},
-          {"load_att_z", ""},
-          {"load_rate_x_rad_s", "rad/s"},
-          {"load_rate_y_rad_s", "rad/s"},
-          {"load_rate_z_rad_s", "rad/s"}};
+/// Signals of a winch, a release and the ground are there if the scenario has them.
+std::vector<Signal> CablesPlant::list_signals() const {
+  std::vector<Signal> signals = {{"cable_tension_n", "N"},
+                                 {"cable_length_m", "m"},
+                                 {"cable_taut", ""},
+                                 {"load_att_w", ""},
+                                 {"load_att_x", ""},
+                                 {"load_att_y", ""},
+                                 {"load_att_z", ""},
+                                 {"load_rate_x_rad_s", "rad/s"},
+                                 {"load_rate_y_rad_s", "rad/s"},
+                                 {"load_rate_z_rad_s", "rad/s"}};
+  if (has_winch_) signals.push_back({"cable_length_rate_m_s", "m/s"});
+  if (has_release_) signals.push_back({"cable_released", ""});
+  if (system_.ground_z_W)
+    for (const char* name : {"load_on_ground", "vehicle_on_ground"}) signals.push_back({name, ""});
+  return signals;
 }
 
 void CablesPlant::note(const cables::Event& event) {
-  int& count = remark_counts_[event.cable];
-  std::vector<std::string>& remarks = remarks_[event.cable];
-  if (++count > kMostRemarks) return;
+  using Kind = cables::Event::Kind;
+  // The first vehicle tells of the load.
+  const bool is_load = event.cable == cables::kLoad;
+  const std::size_t vehicle = is_load ? 0 : event.cable;
+  const std::string body = is_load ? "load" : "vehicle";
   const std::string time =
       " at " + describe_time(static_cast<double>(steps_) * step_s_ + event.time);
-  using Kind = cables::Event::Kind;
-  if (event.kind == Kind::kStuck) {
-    remarks.push_back("cable: too many events in one step" + time +
-                      "; taut cables stay taut until its end");
-  } else if (event.kind == Kind::kSlack) {
-    remarks.push_back("cable slack" + time +
-                      (motion_.taut().empty() ? "; no cable carries the load" : ""));
-  } else {
-    char impulse[32];
-    std::snprintf(impulse, sizeof impulse, "%.6g N s", event.impulse);
-    remarks.push_back("cable taut" + time + ", impulse " + impulse);
+  switch (event.kind) {
+    case Kind::kStuck:
+      return remark(vehicle, "cable: too many events in one step" + time +
+                                 "; taut cables stay taut until its end");
+    case Kind::kSlack:
+      return remark(vehicle, "cable slack" + time + (motion_.taut().empty() ? kNoneCarries : ""));
+    case Kind::kTouchDown:
+      return remark(vehicle, body + " on the ground" + time);
+    case Kind::kLiftOff:
+      return remark(vehicle, body + " lifts off" + time);
+    case Kind::kTaut: {
+      char impulse[32];
+      std::snprintf(impulse, sizeof impulse, "%.6g N s", event.impulse);
+      return remark(vehicle, "cable taut" + time + ", impulse " + impulse);
+    }
   }
-  if (count == kMostRemarks) remarks.push_back("cable: no further remark on it");
+}
+
+void CablesPlant::remark(std::size_t vehicle, const std::string& text) {
+  int& count = remark_counts_[vehicle];
+  if (++count > kMostRemarks) return;
+  remarks_[vehicle].push_back(text);
+  if (count == kMostRemarks) remarks_[vehicle].push_back("cable: no further remark on it");
 }
 
 std::vector<std::string> CablesPlant::take_remarks(std::size_t vehicle) {

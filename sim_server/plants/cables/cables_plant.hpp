@@ -1,12 +1,15 @@
 /// The plant: vehicles, one load, and cables that go slack and taut. README.md.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "sim_server/plants/cables/hybrid_motion.hpp"
 #include "sim_server/plants/cables/start.hpp"
+#include "sim_server/plants/cables/winch.hpp"
 #include "sim_server/plants/plant.hpp"
 
 namespace sls::sim {
@@ -22,19 +25,37 @@ class CablesPlant : public Plant {
   const model::Measurement& measurement(std::size_t vehicle) const override {
     return measurements_[vehicle];
   }
-  std::vector<Signal> signals() const override;
+  std::vector<Signal> signals() const override { return signals_; }
   std::vector<std::string> take_remarks(std::size_t vehicle) override;
 
  private:
   explicit CablesPlant(const PlantSetup& setup, const cables::Start& start);
+  /// A change of a cable that the scenario plans.
+  struct Change {
+    double time;  ///< s
+    std::size_t cable;
+    std::optional<cables::WinchPhase> phase;  ///< of its winch; none: it is cut
+    std::string remark;                       ///< without the time; may be empty
+  };
+
+  void plan(const CablesKeys& keys);
+  std::vector<Signal> list_signals() const;
+  void fly_step();
+  void apply(const Change& change);
   model::Measurement measure(std::size_t vehicle) const;
   void note(const cables::Event& event);
+  void remark(std::size_t vehicle, const std::string& text);
 
   const cables::System system_;
   const double step_s_;
   cables::HybridMotion motion_;
   cables::Actions actions_;
   std::int64_t steps_ = 0;
+  std::vector<Change> changes_;  // by time
+  std::size_t next_change_ = 0;
+  std::vector<std::optional<cables::WinchPhase>> phases_;  // that hold now, of each cable
+  bool has_winch_ = false, has_release_ = false;           // any cable
+  std::vector<Signal> signals_;
   std::vector<cables::Event> events_;  // of one step; a member to avoid allocation
   std::vector<model::Measurement> measurements_;
   std::vector<std::vector<std::string>> remarks_;

@@ -32,6 +32,7 @@ bool Members::operator==(const Members& other) const {
 }
 
 void Factor::compute(const Matrix& a, const Members& members) {
+  constexpr double kDependent = 1e-13;  // rounding of a pivot of 0
   members_ = members;
   Vector scaled;  // row of L times D
   for (std::size_t row = 0; row < members.size(); ++row) {
@@ -43,7 +44,8 @@ void Factor::compute(const Matrix& a, const Members& members) {
       lower_[row][column] = sum * inverse_d_[column];
       pivot -= sum * lower_[row][column];
     }
-    inverse_d_[row] = 1.0 / pivot;
+    const double diagonal = a[members[row]][members[row]];
+    inverse_d_[row] = pivot > kDependent * diagonal ? 1.0 / pivot : 0.0;
   }
 }
 

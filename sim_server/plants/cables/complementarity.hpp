@@ -12,7 +12,10 @@ inline constexpr std::size_t kMaxCables = 16;
 using Vector = std::array<double, kMaxCables>;
 using Matrix = std::array<Vector, kMaxCables>;
 
-/// Some of the cables, ascending.
+/// The load, where vehicles are counted by their cables.
+inline constexpr std::size_t kLoad = kMaxCables;
+
+/// Some of the cables, or some of the bodies (vehicles and kLoad), ascending.
 class Members {
  public:
   Members() = default;
@@ -30,12 +33,12 @@ class Members {
   bool operator==(const Members& other) const;
 
  private:
-  std::array<std::size_t, kMaxCables> cables_;
+  std::array<std::size_t, kMaxCables + 1> cables_;
   std::size_t size_ = 0;
 };
 
 /// L D Lᵀ of the rows and columns `members` of a symmetric positive definite matrix, whose lower
-/// triangle is read.
+/// triangle is read. Of linearly dependent rows the later ones get x = 0.
 class Factor {
  public:
   void compute(const Matrix& a, const Members& members);

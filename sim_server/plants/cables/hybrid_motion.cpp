@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <stdexcept>
+#include <string>
 #include <utility>
 
 namespace sls::sim::cables {
@@ -44,61 +46,155 @@ double calc_tangents_crossing(double at_0, double slope_0, double at_1, double s
   return at_0 + slope_0 * (at_1 - at_0 - slope_1) / (slope_0 - slope_1);
 }
 
+/// The `cables` that move something: not those between a vehicle and a load that both stand.
+Members find_moving(Members cables, const Members& standing) {
+  if (standing.has(kLoad))
+    for (const std::size_t body : standing)
+      if (body != kLoad) cables.remove(body);
+  return cables;
+}
+
+double get_z(const Motion& motion, std::size_t body) {
+  return (body == kLoad ? motion.p_WL : motion.vehicles[body].p_W).z();
+}
+
+double get_fall(const Motion& motion, std::size_t body) {
+  return (body == kLoad ? motion.v_WL : motion.vehicles[body].v_W).z();
+}
+
+void stop(const Members& bodies, Motion& motion) {
+  for (const std::size_t body : bodies) {
+    (body == kLoad ? motion.v_WL : motion.vehicles[body].v_W).setZero();
+    if (body == kLoad) motion.w_WL_L.setZero();
+  }
+}
+
+Members unite(Members some, const Members& others) {
+  for (const std::size_t i : others) some.add(i);
+  return some;
+}
+
+Members find_bodies(const System& system) {
+  if (!system.ground_z_W) return {};
+  Members bodies = Members::all(system.count);
+  bodies.add(kLoad);
+  return bodies;
+}
+
 }  // namespace
 
 struct HybridMotion::Found {
   double time = 0.0;
-  std::size_t cable = kMaxCables;  // none
-  bool is_arrival = false;
+  Limit limit;
 };
 
 HybridMotion::HybridMotion(const System& system, const Motion& start)
-    : system_(system), all_(Members::all(system.count)) {
+    : system_(system),
+      held_(system),
+      uncut_(Members::all(system.count)),
+      bodies_(find_bodies(system)) {
+  now_.tension.fill(0.0);
+  now_.ground.fill(0.0);
+  stage_.ground.fill(0.0);
+  between_ = now_;
   now_.motion = start;
-  calc_geometry(system_, now_.motion, all_, now_.geometry);
+  Members landing;
+  for (const std::size_t body : bodies_)
+    if (get_z(start, body) >= *system_.ground_z_W - kLengthTolerance &&
+        get_fall(start, body) >= 0.0)
+      landing.add(body);
+  calc_geometry(system_, now_.motion, uncut_, now_.geometry);
   // Ends that move apart at the length meet now; the others of these cables do not.
-  taut_ = find_candidates(system_, now_.geometry, kLengthTolerance, kLengthTolerance);
-  place(taut_, now_);
-  const bool meets = std::any_of(taut_.begin(), taut_.end(), [&](std::size_t i) {
+  mode_.taut = find_moving(
+      find_candidates(uncut_, now_.geometry, kLengthTolerance, kLengthTolerance), landing);
+  put_on_ground(landing);
+  place(mode_.taut, now_);
+  const bool meets = std::any_of(mode_.taut.begin(), mode_.taut.end(), [&](std::size_t i) {
     return now_.geometry.stretch_rate[i] > kLengthTolerance;
   });
-  if (meets) {
-    apply_impact(system_, system_.restitution, taut_, now_.motion);
-    calc_geometry(system_, now_.motion, all_, now_.geometry);
-    taut_ = find_touching(now_);
+  if (meets || !landing.empty()) {
+    hit(mode_.taut);
+    calc_geometry(held_, now_.motion, uncut_, now_.geometry);
+    mode_.taut = find_touching(now_);
   }
-  settle(taut_, now_);
-  now_.tension.fill(0.0);
-  tension_between_.fill(0.0);
+  settle(mode_.taut, now_);
+}
+
+bool HybridMotion::holds(const Limit& limit) const {
+  return (limit.of == Limit::Of::kCable ? mode_.taut : mode_.standing).has(limit.index);
+}
+
+/// How far something is beyond its limit, m.
+double HybridMotion::calc_excess(const Instant& instant, const Limit& limit) const {
+  if (limit.of == Limit::Of::kCable) return instant.geometry.stretch[limit.index];
+  return get_z(instant.motion, limit.index) - *system_.ground_z_W;
+}
+
+double HybridMotion::calc_excess_rate(const Instant& instant, const Limit& limit) const {
+  if (limit.of == Limit::Of::kCable) return instant.geometry.stretch_rate[limit.index];
+  return get_fall(instant.motion, limit.index);
+}
+
+void HybridMotion::set_standing(const Members& standing) {
+  if (standing == mode_.standing) return;
+  mode_.standing = standing;
+  held_ = hold_still(system_, standing);
+}
+
+/// The `bodies`, which are at the ground, stand on it.
+void HybridMotion::put_on_ground(const Members& bodies) {
+  Motion& motion = now_.motion;
+  for (const std::size_t body : bodies)
+    (body == kLoad ? motion.p_WL : motion.vehicles[body].p_W).z() = *system_.ground_z_W;
+  set_standing(unite(mode_.standing, bodies));
 }
 
 /// The cables at their length whose ends do not approach.
 Members HybridMotion::find_touching(const Instant& instant) const {
   const double speed = instant.motion.v_WL.lpNorm<1>(), place = instant.motion.p_WL.lpNorm<1>();
-  return find_candidates(system_, instant.geometry, kTouching * (1.0 + place),
-                         kTouching * (1.0 + speed));
+  return find_moving(find_candidates(uncut_, instant.geometry, kTouching * (1.0 + place),
+                                     kTouching * (1.0 + speed)),
+                     mode_.standing);
 }
 
-/// Tensions and accelerations of the taut cables.
+/// Forces and accelerations, with the taut cables at their length and the standing bodies still.
 void HybridMotion::pull(const Actions& actions, Instant& instant) const {
-  calc_free_rate(system_, instant.motion, actions, instant.rate);
+  calc_free_rate(held_, instant.motion, actions, instant.rate);
   Vector offset;
-  calc_offset(system_, instant.motion, instant.geometry, actions, instant.rate, taut_, offset);
-  for (const std::size_t i : taut_) offset[i] = -offset[i];
+  calc_offset(held_, instant.motion, instant.geometry, actions, instant.rate, mode_.taut, offset);
+  for (const std::size_t i : mode_.taut) offset[i] = -offset[i];
   instant.tension.fill(0.0);
   instant.factor.solve(offset, instant.tension);
-  add_pulls(system_, instant.geometry, instant.tension, taut_, instant.rate);
+  add_pulls(held_, instant.geometry, instant.tension, mode_.taut, instant.rate);
+  if (!mode_.standing.empty()) support(actions, instant);
+}
+
+/// The forces of the ground; README.md, eq. (11).
+void HybridMotion::support(const Actions& actions, Instant& instant) const {
+  for (const std::size_t body : mode_.standing) {
+    double& force = instant.ground[body];
+    if (body == kLoad) {
+      force = system_.load_mass * system_.gravity;
+      for (const std::size_t i : mode_.taut)
+        force -= instant.tension[i] * instant.geometry.n_W[i].z();
+    } else {
+      force = system_.vehicle_mass[body] * system_.gravity +
+              calc_force(actions, instant.motion.vehicles[body], body).z();
+      if (mode_.taut.has(body)) force += instant.tension[body] * instant.geometry.n_W[body].z();
+    }
+  }
 }
 
 /// Brings the `cables` to their length, eq. (8), and computes their geometry and factor.
 void HybridMotion::place(const Members& cables, Instant& instant) const {
   Motion& motion = instant.motion;
   Geometry& geometry = instant.geometry;
-  if (system_.is_rigid) motion.q_WL /= std::sqrt(motion.q_WL.squaredNorm());
+  if (system_.is_rigid && !mode_.standing.has(kLoad))
+    motion.q_WL /= std::sqrt(motion.q_WL.squaredNorm());
   // Newton's method; the error of a step, of order h⁵, needs one correction.
   constexpr int kMostCorrections = 4;
   for (int corrections = 0;; ++corrections) {
-    calc_geometry(system_, motion, all_, geometry);
+    calc_geometry(held_, motion, uncut_, geometry);
     hold(cables, instant);
     double error = 0.0;
     for (const std::size_t i : cables) error = std::max(error, std::abs(geometry.stretch[i]));
@@ -106,7 +202,7 @@ void HybridMotion::place(const Members& cables, Instant& instant) const {
     if (!(error > rounding) || corrections == kMostCorrections) return;
     Vector shift;
     instant.factor.solve(geometry.stretch, shift);
-    add_shifts(system_, geometry, shift, cables, motion);
+    add_shifts(held_, geometry, shift, cables, motion);
   }
 }
 
@@ -115,31 +211,114 @@ void HybridMotion::settle(const Members& cables, Instant& instant) const {
   place(cables, instant);
   Vector impulses;
   instant.factor.solve(instant.geometry.stretch_rate, impulses);
-  add_pulls(system_, instant.geometry, impulses, cables, instant.motion);
+  add_pulls(held_, instant.geometry, impulses, cables, instant.motion);
   for (const std::size_t i : cables) instant.geometry.stretch_rate[i] = 0.0;
 }
 
 void HybridMotion::hold(const Members& cables, Instant& instant) const {
   Matrix matrix;
-  calc_matrix(system_, instant.geometry, cables, matrix);
+  calc_matrix(held_, instant.geometry, cables, matrix);
   instant.factor.compute(matrix, cables);
 }
 
-/// Which of the `candidates` are taut from now on.
-void HybridMotion::choose_taut(const Actions& actions, const Members& candidates) {
-  const Accelerations result =
-      calc_accelerations(system_, now_.motion, now_.geometry, actions, candidates);
-  now_.rate = result.rate;
-  now_.tension = result.tension;
-  taut_ = result.taut;
-  hold(taut_, now_);
+/// By how much a standing body is pulled off, N: > 0 only if the vertical forces exceed its weight
+/// and, set free, it would rise. README.md, "Ground".
+double HybridMotion::calc_lift(const Actions& actions, const Instant& instant,
+                               std::size_t body) const {
+  const double pulled = -instant.ground[body];
+  if (!(pulled > 0.0)) return pulled;
+  Members standing = mode_.standing;
+  standing.remove(body);
+  const System freed = hold_still(system_, standing);
+  Geometry geometry;
+  calc_geometry(freed, instant.motion, uncut_, geometry);
+  const Members candidates = find_moving(
+      unite(find_candidates(uncut_, geometry, kLengthTolerance, kLengthTolerance), mode_.taut),
+      standing);
+  const Motion rate = calc_accelerations(freed, instant.motion, geometry, actions, candidates).rate;
+  const double mass = body == kLoad ? system_.load_mass : system_.vehicle_mass[body];
+  const double rise = body == kLoad ? -rate.v_WL.z() : -rate.vehicles[body].v_W.z();
+  return std::min(pulled, mass * rise);
 }
 
 /// The `cables` are taut from now on, also if they push.
-void HybridMotion::keep_taut(const Actions& actions, const Members& cables) {
-  taut_ = cables;
-  hold(taut_, now_);
+void HybridMotion::keep(const Actions& actions, const Members& cables) {
+  mode_.taut = cables;
+  hold(cables, now_);
   pull(actions, now_);
+}
+
+/// Which of the `candidates` are taut from now on, with the standing bodies still.
+void HybridMotion::solve(const Actions& actions, const Members& candidates) {
+  const Accelerations result =
+      calc_accelerations(held_, now_.motion, now_.geometry, actions, candidates);
+  now_.rate = result.rate;
+  now_.tension = result.tension;
+  mode_.taut = result.taut;
+  hold(mode_.taut, now_);
+}
+
+/// Which of the `candidates` are taut, and which bodies still stand, from now on.
+void HybridMotion::choose(const Actions& actions, const Members& candidates) {
+  solve(actions, find_moving(candidates, mode_.standing));
+  while (!mode_.standing.empty()) {
+    support(actions, now_);
+    const auto* rising =
+        std::find_if(mode_.standing.begin(), mode_.standing.end(), [&](std::size_t body) {
+          return calc_lift(actions, now_, body) > kRounding * force_scale_;
+        });
+    if (rising == mode_.standing.end()) return;
+    set_free(*rising);
+    solve(actions, find_moving(unite(candidates, find_touching(now_)), mode_.standing));
+  }
+}
+
+void HybridMotion::set_free(std::size_t body) {
+  Members others = mode_.standing;
+  others.remove(body);
+  set_standing(others);
+  calc_geometry(held_, now_.motion, uncut_, now_.geometry);
+}
+
+/// An impact: impulses along the cables `meeting`, and of the ground, which stops the standing
+/// bodies unless cables pull them off. Returns the impulses of the cables.
+Vector HybridMotion::hit(const Members& meeting) {
+  const Motion before = now_.motion;
+  Vector impulses;
+  const auto fly_on = [&](const Members& standing) {
+    set_standing(standing);
+    now_.motion = before;
+    stop(standing, now_.motion);
+    impulses =
+        apply_impact(held_, system_.restitution, find_moving(meeting, standing), now_.motion);
+  };
+  fly_on(mode_.standing);
+  for (Members tried; tried.size() < mode_.standing.size();) {
+    const auto* next = std::find_if(mode_.standing.begin(), mode_.standing.end(),
+                                    [&](std::size_t body) { return !tried.has(body); });
+    const std::size_t body = *next;
+    tried.add(body);
+    // The impulse with which the ground stops the body.
+    double down =
+        (body == kLoad ? system_.load_mass : system_.vehicle_mass[body]) * get_fall(before, body);
+    double scale = std::abs(down);
+    for (const std::size_t i : meeting) {
+      if (body != kLoad && body != i) continue;
+      const double along = impulses[i] * now_.geometry.n_W[i].z();
+      down += body == kLoad ? -along : along;
+      scale += impulses[i];
+    }
+    if (!(down < -kRounding * scale)) continue;
+    const Members standing = mode_.standing;
+    Members others = standing;
+    others.remove(body);
+    fly_on(others);
+    if (get_fall(now_.motion, body) < 0.0)
+      tried = {};  // it rises; the other bodies feel other impulses
+    else
+      fly_on(standing);
+  }
+  return impulses;
 }
 
 void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
@@ -148,37 +327,44 @@ void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
   Motion sum = now_.rate;
   const auto calc_stage = [&](double share, const Motion& rate) {
     add(system_, now_.motion, share * h, rate, stage.motion);
-    calc_geometry(system_, stage.motion, taut_, stage.geometry);
-    hold(taut_, stage);
+    calc_geometry(held_, stage.motion, mode_.taut, stage.geometry);
+    hold(mode_.taut, stage);
     pull(actions, stage);
   };
   calc_stage(0.5, now_.rate);
   add(system_, sum, 2.0, stage.rate, sum);
   calc_stage(0.5, stage.rate);
   add(system_, sum, 2.0, stage.rate, sum);
-  tension_between_ = stage.tension;
+  between_ = stage;
   calc_stage(1.0, stage.rate);
   add(system_, sum, 1.0, stage.rate, sum);
   add(system_, now_.motion, h / 6.0, sum, end.motion);
-  settle(taut_, end);
+  settle(mode_.taut, end);
   pull(actions, end);
 }
 
-/// How far cable i violates its mode after `time`: a negative tension, or a distance beyond the
-/// length.
-double HybridMotion::calc_violation(const Actions& actions, double time, std::size_t i) {
-  integrate(actions, time, trial_);
-  return taut_.has(i) ? -trial_.tension[i] : trial_.geometry.stretch[i];
+/// How far the mode of a limit is violated: by a negative tension, a lift (N), or an excess (m).
+double HybridMotion::calc_violation(const Actions& actions, const Instant& instant,
+                                    const Limit& limit) const {
+  if (!holds(limit)) return calc_excess(instant, limit);
+  if (limit.of == Limit::Of::kCable) return -instant.tension[limit.index];
+  return calc_lift(actions, instant, limit.index);
 }
 
-/// When the tension of cable i becomes negative within `h`; none if it does not.
-std::optional<double> HybridMotion::find_slack(const Actions& actions, double h, const Instant& end,
-                                               std::size_t i) {
-  const double start = now_.tension[i], between = tension_between_[i], last = end.tension[i];
+/// When a limit that holds is lost within `h`, because its force becomes negative; none if not.
+std::optional<double> HybridMotion::find_loss(const Actions& actions, double h, const Instant& end,
+                                              const Limit& limit) {
+  const auto force = [&](const Holding& at) {
+    return limit.of == Limit::Of::kCable ? at.tension[limit.index] : at.ground[limit.index];
+  };
+  const double start = force(now_), between = force(between_), last = force(end);
   const double tolerance = kRounding * force_scale_;
-  const auto violation = [&](double time) { return calc_violation(actions, time, i); };
-  double until = h, at_end = -last;
-  if (!(last < -tolerance)) {
+  const auto violation = [&](double time) {
+    integrate(actions, time, trial_);
+    return calc_violation(actions, trial_, limit);
+  };
+  double until = h, at_end = calc_violation(actions, end, limit);
+  if (!(at_end > tolerance)) {
     // A dip: by the parabola through the middle, whose tangents at both ends meet below it.
     const double fall = 4.0 * between - 3.0 * start - last,
                  rise = start - 4.0 * between + 3.0 * last;
@@ -207,17 +393,21 @@ std::optional<double> HybridMotion::find_slack(const Actions& actions, double h,
     until = at_left > tolerance ? left : right;
     at_end = at_left > tolerance ? at_left : at_right;
   }
-  if (start < 0.0) return 0.0;
-  return find_crossing(violation, 0.0, -start, until, at_end);
+  const double at_start = calc_violation(actions, now_, limit);
+  if (at_start > 0.0) return 0.0;
+  return find_crossing(violation, 0.0, at_start, until, at_end);
 }
 
-/// When the distance of cable i exceeds its length within `h`; none if it does not.
+/// When a limit that does not hold is reached within `h`; none if it is not.
 std::optional<double> HybridMotion::find_arrival(const Actions& actions, double h,
-                                                 const Instant& end, std::size_t i) {
-  const double start = now_.geometry.stretch[i], last = end.geometry.stretch[i];
-  const double rate = now_.geometry.stretch_rate[i], last_rate = end.geometry.stretch_rate[i];
+                                                 const Instant& end, const Limit& limit) {
+  const double start = calc_excess(now_, limit), last = calc_excess(end, limit);
+  const double rate = calc_excess_rate(now_, limit), last_rate = calc_excess_rate(end, limit);
   const double tolerance = 0.1 * kTouching * (1.0 + end.motion.p_WL.lpNorm<1>());
-  const auto violation = [&](double time) { return calc_violation(actions, time, i); };
+  const auto violation = [&](double time) {
+    integrate(actions, time, trial_);
+    return calc_excess(trial_, limit);
+  };
   double until = h, at_end = last;
   if (!(last > tolerance)) {
     // A reach beyond the length and back: between, the distance is greatest.
@@ -225,15 +415,16 @@ std::optional<double> HybridMotion::find_arrival(const Actions& actions, double 
     if (!(calc_tangents_crossing(start, rate * h, last, last_rate * h) > tolerance)) return {};
     const auto fall = [&](double time) {
       integrate(actions, time, trial_);
-      return -trial_.geometry.stretch_rate[i];
+      return -calc_excess_rate(trial_, limit);
     };
     until = find_crossing(fall, 0.0, -rate, h, -last_rate);
     at_end = violation(until);
     if (!(at_end > tolerance)) return {};
   }
   double from = 0.0, at_start = start;
-  if (start >= -tolerance && rate < 0.0) {
-    // It just left its length, and comes back: begin where it is away.
+  const bool leaves = limit.of == Limit::Of::kCable ? rate < 0.0 : rate <= 0.0;
+  if (start >= -tolerance && leaves) {
+    // It just left its limit, and comes back: begin where it is away.
     for (from = 0.5 * until; from > kTimeTolerance; from *= 0.5)
       if ((at_start = violation(from)) < 0.0) break;
   }
@@ -243,73 +434,103 @@ std::optional<double> HybridMotion::find_arrival(const Actions& actions, double 
 
 HybridMotion::Found HybridMotion::find_first(const Actions& actions, double h, const Instant& end) {
   Found first;
-  const Vector between = tension_between_;
-  for (std::size_t i = 0; i < system_.count; ++i) {
-    const bool is_taut = taut_.has(i);
-    if (is_taut && is_stuck_) continue;
-    tension_between_ = between;  // a search overwrites it
-    const auto time = is_taut ? find_slack(actions, h, end, i) : find_arrival(actions, h, end, i);
-    if (time && (first.cable == kMaxCables || *time < first.time)) first = {*time, i, !is_taut};
-  }
+  const Holding between = between_;
+  const auto look = [&](const Limit& limit) {
+    const bool is_held = holds(limit);
+    if (is_held && is_stuck_) return;
+    between_ = between;  // a search overwrites it
+    const auto time =
+        is_held ? find_loss(actions, h, end, limit) : find_arrival(actions, h, end, limit);
+    if (time && (first.limit.of == Limit::Of::kNothing || *time < first.time))
+      first = {*time, limit};
+  };
+  for (const std::size_t i : find_moving(uncut_, mode_.standing)) look({Limit::Of::kCable, i});
+  for (const std::size_t body : bodies_) look({Limit::Of::kBody, body});
   return first;
 }
 
-/// The cable `cable` reaches its length, with others.
-void HybridMotion::meet(const Actions& actions, double time, std::size_t cable,
+/// A cable reaches its length, or a body the ground, with others.
+void HybridMotion::meet(const Actions& actions, double time, const Limit& limit,
                         std::vector<Event>& events) {
   const Geometry& geometry = now_.geometry;
-  Members meeting = taut_;
-  meeting.add(cable);
-  const Members before = taut_;
+  const Mode before = mode_;
+  Members meeting = mode_.taut, landing;
+  (limit.of == Limit::Of::kCable ? meeting : landing).add(limit.index);
   // Ends that approach so slowly that they would not get away by more than rounding stay.
-  const bool stays = geometry.stretch_rate[cable] < 0.0;
+  const bool stays = calc_excess_rate(now_, limit) < 0.0;
   if (is_stuck_ || stays) {
+    put_on_ground(landing);
+    stop(landing, now_.motion);
+    meeting = find_moving(meeting, mode_.standing);
     settle(meeting, now_);
-    calc_geometry(system_, now_.motion, all_, now_.geometry);
+    calc_geometry(held_, now_.motion, uncut_, now_.geometry);
     if (is_stuck_)
-      keep_taut(actions, meeting);
+      keep(actions, meeting);
     else
-      choose_taut(actions, meeting);
+      choose(actions, meeting);
     report(before, time, events);
     return;
   }
-  for (const std::size_t i : all_)
+  for (const std::size_t i : uncut_)
     if (geometry.stretch[i] >= -kTouching ||
         geometry.stretch[i] + kSimultaneous * geometry.stretch_rate[i] >= 0.0)
       meeting.add(i);
-  place(meeting, now_);
-  const Vector impulses = apply_impact(system_, system_.restitution, meeting, now_.motion);
+  for (const std::size_t body : bodies_) {
+    const double below = get_z(now_.motion, body) - *system_.ground_z_W;
+    const double fall = get_fall(now_.motion, body);
+    if (fall > 0.0 && below + std::max(kTouching, kSimultaneous * fall) >= 0.0) landing.add(body);
+  }
+  put_on_ground(landing);
+  place(find_moving(meeting, mode_.standing), now_);
+  const Vector impulses = hit(meeting);
   for (const std::size_t i : meeting)
-    if (impulses[i] > 0.0 && !before.has(i))
+    if (impulses[i] > 0.0 && !before.taut.has(i))
       events.push_back({Event::Kind::kTaut, i, time, impulses[i]});
-  calc_geometry(system_, now_.motion, all_, now_.geometry);
-  choose_taut(actions, find_touching(now_));
-  Members were_taut = before;
+  calc_geometry(held_, now_.motion, uncut_, now_.geometry);
+  choose(actions, find_touching(now_));
+  Mode known = before;
   for (const std::size_t i : meeting)
-    if (impulses[i] > 0.0) were_taut.add(i);
-  report(were_taut, time, events);
+    if (impulses[i] > 0.0) known.taut.add(i);
+  report(known, time, events);
 }
 
-/// The tension of the cable `cable` becomes negative.
-void HybridMotion::slacken(const Actions& actions, double time, std::size_t cable,
-                           std::vector<Event>& events) {
-  const Members before = taut_;
-  Members candidates = find_touching(now_);
-  for (const std::size_t i : taut_) candidates.add(i);
-  choose_taut(actions, candidates);
-  if (taut_ == before) {  // the tension is rounding of 0
-    Members others = before;
-    others.remove(cable);
-    keep_taut(actions, others);
+/// A force that holds becomes negative: the cable goes slack, or the body lifts off.
+void HybridMotion::let_go(const Actions& actions, double time, const Limit& limit,
+                          std::vector<Event>& events) {
+  const Mode before = mode_;
+  if (limit.of == Limit::Of::kBody) set_free(limit.index);
+  const Members candidates = unite(find_touching(now_), mode_.taut);
+  choose(actions, candidates);
+  if (limit.of == Limit::Of::kCable && mode_.taut == before.taut) {  // it is rounding of 0
+    Members others = before.taut;
+    others.remove(limit.index);
+    keep(actions, others);
   }
   report(before, time, events);
 }
 
-/// Reports the cables that became taut or slack since `before`.
-void HybridMotion::report(const Members& before, double time, std::vector<Event>& events) const {
-  for (const std::size_t i : all_)
-    if (before.has(i) != taut_.has(i))
-      events.push_back({taut_.has(i) ? Event::Kind::kTaut : Event::Kind::kSlack, i, time, 0.0});
+/// Reports the cables that became taut or slack since `before`, and the bodies that came to stand
+/// or lifted off.
+void HybridMotion::report(const Mode& before, double time, std::vector<Event>& events) const {
+  using Kind = Event::Kind;
+  for (const std::size_t i : uncut_)
+    if (before.taut.has(i) != mode_.taut.has(i))
+      events.push_back({mode_.taut.has(i) ? Kind::kTaut : Kind::kSlack, i, time, 0.0});
+  for (const std::size_t body : bodies_)
+    if (before.standing.has(body) != mode_.standing.has(body))
+      events.push_back(
+          {mode_.standing.has(body) ? Kind::kTouchDown : Kind::kLiftOff, body, time, 0.0});
+}
+
+void HybridMotion::set_length(std::size_t cable, double length, double rate) {
+  now_.motion.vehicles[cable].length = length;
+  now_.motion.vehicles[cable].length_rate = rate;
+}
+
+void HybridMotion::cut(std::size_t cable) {
+  uncut_.remove(cable);
+  mode_.taut.remove(cable);
+  hold(mode_.taut, now_);
 }
 
 void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& events) {
@@ -319,14 +540,16 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
     force_scale_ += system_.vehicle_mass[i] * system_.gravity + actions.f_Q_W[i].lpNorm<1>();
   // Forces jump between steps: which cables pull now?
   pull(actions, now_);
-  Members candidates = find_touching(now_);
-  const bool has_slackened = std::any_of(taut_.begin(), taut_.end(), [&](std::size_t i) {
-    return now_.tension[i] < -kRounding * force_scale_;
-  });
-  for (const std::size_t i : taut_) candidates.add(i);
-  if (has_slackened || !(candidates == taut_)) {
-    const Members before = taut_;
-    choose_taut(actions, candidates);
+  const auto pushes = [&](std::size_t i) { return now_.tension[i] < -kRounding * force_scale_; };
+  const auto lifts = [&](std::size_t body) {
+    return calc_lift(actions, now_, body) > kRounding * force_scale_;
+  };
+  const Members &taut = mode_.taut, &standing = mode_.standing;
+  const Members candidates = unite(find_touching(now_), taut);
+  if (std::any_of(taut.begin(), taut.end(), pushes) || !(candidates == taut) ||
+      std::any_of(standing.begin(), standing.end(), lifts)) {
+    const Mode before = mode_;
+    choose(actions, candidates);
     report(before, 0.0, events);
   }
   double time = 0.0;
@@ -334,21 +557,32 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
     const double rest = h - time;
     integrate(actions, rest, then_);
     const Found found = find_first(actions, rest, then_);
-    if (found.cable == kMaxCables) break;
+    if (found.limit.of == Limit::Of::kNothing) break;
     integrate(actions, found.time, then_);
     std::swap(now_, then_);
     time += found.time;
-    if (found.is_arrival)
-      meet(actions, time, found.cable, events);
+    if (holds(found.limit))
+      let_go(actions, time, found.limit, events);
     else
-      slacken(actions, time, found.cable, events);
+      meet(actions, time, found.limit, events);
     if (count == kMostEvents) {
       is_stuck_ = true;
-      events.push_back({Event::Kind::kStuck, found.cable, time, 0.0});
+      events.push_back({Event::Kind::kStuck, found.limit.index, time, 0.0});
     }
     if (time >= h) return;
   }
   std::swap(now_, then_);
+  check_held();
+}
+
+/// Nothing is there to move if the cable between a vehicle and a load that stand shortens.
+void HybridMotion::check_held() const {
+  if (!mode_.standing.has(kLoad)) return;
+  for (const std::size_t i : uncut_)
+    if (mode_.standing.has(i) && now_.geometry.stretch[i] > kLengthTolerance)
+      throw std::runtime_error("cable " + std::to_string(i) +
+                               ": its winch pulls at a vehicle and a load that both stand on the "
+                               "ground, which holds them");
 }
 
 }  // namespace sls::sim::cables

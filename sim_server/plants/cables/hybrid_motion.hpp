@@ -1,7 +1,8 @@
 /// The motion over time: fixed steps of fourth order, and what happens inside them. README.md,
-/// "Integration" and "Events".
+/// "Integration", "Events" and "Ground".
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -12,66 +13,111 @@ namespace sls::sim::cables {
 
 struct Event {
   enum class Kind {
-    kTaut,   ///< a cable reached its length
-    kSlack,  ///< its tension would become negative, or the impact threw its ends together
-    kStuck,  ///< too many events in one step: until its end, taut cables stay taut
+    kTaut,       ///< a cable reached its length
+    kSlack,      ///< its tension would become negative, or the impact threw its ends together
+    kStuck,      ///< too many events in one step: until its end, what touches stays
+    kTouchDown,  ///< a body came to stand on the ground
+    kLiftOff,    ///< it left the ground
   };
   Kind kind;
-  std::size_t cable;
-  double time;     ///< since the start of the step, s
-  double impulse;  ///< of the cable that became taut, N·s
+  std::size_t cable;  ///< or the body: a vehicle, or kLoad
+  double time;        ///< since the start of the step, s
+  double impulse;     ///< of the cable that became taut, N·s
 };
 
 class HybridMotion {
  public:
-  /// Cables within `kLengthTolerance` of their length, whose ends do not approach, are taut.
+  /// Cables within `kLengthTolerance` of their length, whose ends do not approach, are taut. Bodies
+  /// within it of the ground that do not rise stand on it.
   HybridMotion(const System& system, const Motion& start);
 
   /// Flies one step of `h` seconds. Appends what happened to `events`.
+  /// @throws std::runtime_error if a cable would become shorter than the distance of a vehicle and
+  ///   a load that both stand.
   void step(const Actions& actions, double h, std::vector<Event>& events);
 
+  /// Between steps: the length of a cable (m) and its rate (m/s), with which the next step begins.
+  void set_length(std::size_t cable, double length, double rate);
+  /// Between steps: from now on the cable never pulls.
+  void cut(std::size_t cable);
+  bool is_cut(std::size_t cable) const { return !uncut_.has(cable); }
+
   const Motion& motion() const { return now_.motion; }
-  const Members& taut() const { return taut_; }
+  const Members& taut() const { return mode_.taut; }
+  /// Vehicles, and kLoad.
+  const Members& standing() const { return mode_.standing; }
   /// Of the last step's actions, N; 0 of a slack cable and before the first step.
   const Vector& tension() const { return now_.tension; }
 
   static constexpr double kLengthTolerance = 1e-9;  ///< m
 
  private:
+  using OfBodies = std::array<double, kMaxCables + 1>;
+
+  /// The limits that hold now: cables at their length that pull, bodies on the ground.
+  struct Mode {
+    Members taut, standing;
+  };
+
+  /// Forces of what holds: of the taut cables, and of the ground on standing bodies, upwards, N.
+  struct Holding {
+    Vector tension;
+    OfBodies ground;
+  };
+
   /// An instant, with what was computed for it.
-  struct Instant {
+  struct Instant : Holding {
     Motion motion;
     Geometry geometry;  ///< of all cables
     Factor factor;      ///< of the taut ones
     Motion rate;
-    Vector tension;
   };
 
+  /// A cable, whose limit is its length, or a body, whose limit is the ground.
+  struct Limit {
+    enum class Of { kNothing, kCable, kBody };
+    Of of = Of::kNothing;
+    std::size_t index = 0;
+  };
   struct Found;
 
+  bool holds(const Limit& limit) const;
+  double calc_excess(const Instant& instant, const Limit& limit) const;
+  double calc_excess_rate(const Instant& instant, const Limit& limit) const;
+
+  void set_standing(const Members& standing);
+  void set_free(std::size_t body);
+  void put_on_ground(const Members& bodies);
   Members find_touching(const Instant& instant) const;
   void pull(const Actions& actions, Instant& instant) const;
+  void support(const Actions& actions, Instant& instant) const;
   void place(const Members& cables, Instant& instant) const;
   void settle(const Members& cables, Instant& instant) const;
   void hold(const Members& cables, Instant& instant) const;
-  void keep_taut(const Actions& actions, const Members& cables);
-  void choose_taut(const Actions& actions, const Members& candidates);
+  double calc_lift(const Actions& actions, const Instant& instant, std::size_t body) const;
+  void keep(const Actions& actions, const Members& cables);
+  void solve(const Actions& actions, const Members& candidates);
+  void choose(const Actions& actions, const Members& candidates);
+  Vector hit(const Members& meeting);
   void integrate(const Actions& actions, double h, Instant& end);
-  double calc_violation(const Actions& actions, double time, std::size_t cable);
-  std::optional<double> find_slack(const Actions& actions, double h, const Instant& end,
-                                   std::size_t cable);
+  double calc_violation(const Actions& actions, const Instant& instant, const Limit& limit) const;
+  std::optional<double> find_loss(const Actions& actions, double h, const Instant& end,
+                                  const Limit& limit);
   std::optional<double> find_arrival(const Actions& actions, double h, const Instant& end,
-                                     std::size_t cable);
+                                     const Limit& limit);
   Found find_first(const Actions& actions, double h, const Instant& end);
-  void meet(const Actions& actions, double time, std::size_t cable, std::vector<Event>& events);
-  void slacken(const Actions& actions, double time, std::size_t cable, std::vector<Event>& events);
-  void report(const Members& before, double time, std::vector<Event>& events) const;
+  void meet(const Actions& actions, double time, const Limit& limit, std::vector<Event>& events);
+  void let_go(const Actions& actions, double time, const Limit& limit, std::vector<Event>& events);
+  void check_held() const;
+  void report(const Mode& before, double time, std::vector<Event>& events) const;
 
   const System system_;
-  const Members all_;
-  Members taut_;
+  System held_;           // with the standing bodies infinitely heavy
+  Members uncut_;         // cables
+  const Members bodies_;  // that the ground stops; none without ground
+  Mode mode_;
   Instant now_, then_, trial_, stage_;
-  Vector tension_between_;    // in the middle of the step last integrated, N
+  Holding between_;           // in the middle of the step last integrated
   double force_scale_ = 0.0;  // of all forces, N
   bool is_stuck_ = false;
 };

@@ -1,7 +1,9 @@
 #include "sim_server/plants/cables/keys.hpp"
 
 #include "common/config/own_keys.hpp"
+#include "sim_server/plants/cables/hybrid_motion.hpp"
 #include "sim_server/plants/cables/start.hpp"
+#include "sim_server/plants/cables/winch.hpp"
 #include "sim_server/plants/inertia.hpp"
 
 namespace sls::sim {
@@ -24,6 +26,70 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
     if (!defect.empty()) throw places.make_error_at("plant.cables", defect);
     check_load(keys, places);
     check_start(keys, scenario, places);
+    for (std::size_t i = 0; i < keys.cables.size(); ++i)
+      if (keys.cables[i].winch)
+        check_winch(*keys.cables[i].winch, "plant.cables[" + std::to_string(i) + "].winch",
+                    scenario.vehicles[i].rod_length.value_or(scenario.vehicle.rod_length), places);
+  }
+
+  /// Every length fits the drum, and every stage begins after the one before.
+  static void check_winch(const WinchKeys& winch, const std::string& path, double length,
+                          const config::Places& places) {
+    const auto expect = [&](bool holds, const std::string& key, const std::string& expected,
+                            double got) {
+      if (!holds)
+        throw places.make_error_at(path + "." + key,
+                                   "expected " + expected + ", got " + config::to_text(got));
+    };
+    const std::string start = "the cable's length at the start (" + config::to_text(length) + ")";
+    expect(winch.min_length <= length, "min_length_m", "at most " + start, winch.min_length);
+    expect(winch.max_length >= length, "max_length_m", "at least " + start, winch.max_length);
+    double begun = -1.0, ended = 0.0;
+    for (std::size_t k = 0; k < winch.stages.size(); ++k) {
+      const WinchStageKeys& stage = winch.stages[k];
+      const std::string key = "stages[" + std::to_string(k) + "].";
+      expect(winch.min_length <= stage.length && stage.length <= winch.max_length, key + "length_m",
+             "a length of the drum, " + config::to_text(winch.min_length) + " to " +
+                 config::to_text(winch.max_length),
+             stage.length);
+      const std::vector<cables::WinchPhase> phases = cables::make_phases(stage, length);
+      const double at = phases[0].start;
+      expect(at > begun, key + "at_s",
+             "> " + config::to_text(begun) + ", when the stage before begins", at);
+      expect(at >= ended, key + "at_s",
+             ">= " + config::to_text(ended) + ", when the stage before ends", at);
+      begun = at;
+      ended = phases.back().start;
+      length = stage.length;
+    }
+  }
+
+  /// Nothing is inside the ground, and what stands on it is at rest.
+  static void check_ground(const CablesKeys& keys, const std::vector<PlantSetup::Vehicle>& vehicles,
+                           const config::Places& places) {
+    const cables::Motion motion = cables::make_start(keys, vehicles).motion;
+    const double z = *keys.ground_z;
+    const auto check_body = [&](const std::string& name, const Eigen::Vector3d& p,
+                                const Eigen::Vector3d& v) {
+      constexpr double kTolerance = cables::HybridMotion::kLengthTolerance;
+      if (p.z() > z + kTolerance)
+        throw places.make_error_at(
+            "plant.ground_z_m", "expected at least " + config::to_text(p.z()) + ", the z of " +
+                                    name + " at the start (z is down), got " + config::to_text(z));
+      if (p.z() >= z - kTolerance && v.z() >= 0.0 && !v.isZero(0.0))
+        throw places.make_error_at("plant.initial", "expected " + name +
+                                                        " at rest on the ground or rising from it, "
+                                                        "got a velocity of " +
+                                                        show(v));
+    };
+    check_body("the load", motion.p_WL, motion.v_WL);
+    if (motion.p_WL.z() >= z - cables::HybridMotion::kLengthTolerance && motion.v_WL.z() >= 0.0 &&
+        !keys.load_rates.isZero(0.0))
+      throw places.make_error_at(
+          "plant.load_rates_rad_s",
+          "expected [0, 0, 0] of a load that stands on the ground, got " + show(keys.load_rates));
+    for (std::size_t i = 0; i < vehicles.size(); ++i)
+      check_body("vehicle " + std::to_string(i), motion.vehicles[i].p_W, motion.vehicles[i].v_W);
   }
 
   static void check_load(const CablesKeys& keys, const config::Places& places) {
@@ -52,6 +118,7 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
   static void check_start(const CablesKeys& keys, const config::Scenario& scenario,
                           const config::Places& places) {
     Eigen::Vector3d of_first;
+    std::vector<PlantSetup::Vehicle> vehicles;
     for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id) {
       const config::Scenario alone = config::make_vehicle_scenario(scenario, id);
       const std::string cable = "plant.cables[" + std::to_string(id) + "]";
@@ -61,8 +128,8 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
                                    "expected at most the cable's length (" +
                                        config::to_text(length) + "), got " +
                                        config::to_text(*keys.cables[id].distance));
-      const Eigen::Vector3d centre =
-          cables::calc_load_centre(keys, {id, alone.vehicle, alone.plant.initial}, id);
+      vehicles.push_back({id, alone.vehicle, alone.plant.initial});
+      const Eigen::Vector3d centre = cables::calc_load_centre(keys, vehicles.back(), id);
       if (id == 0) of_first = centre;
       constexpr double kRounding = 1e-9;  // m, of the sums in a file
       if ((centre - of_first).norm() > kRounding)
@@ -70,6 +137,7 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
                                    "expected an offset that places the load's centre at " +
                                        show(of_first) + " as vehicle 0 does, got " + show(centre));
     }
+    if (keys.ground_z) check_ground(keys, vehicles, places);
   }
 };
 

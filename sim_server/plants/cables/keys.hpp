@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
@@ -11,11 +12,26 @@
 
 namespace sls::sim {
 
+/// A movement of a winch from rest to rest.
+struct WinchStageKeys {
+  std::int64_t at_ns = 0;     ///< when it begins
+  double length = 1.0;        ///< at its end, m
+  double rate = 1.0;          ///< largest, m/s
+  double acceleration = 1.0;  ///< of the length, m/s²
+};
+
+struct WinchKeys {
+  double min_length = 0.0, max_length = 0.0;  ///< of the drum, m
+  std::vector<WinchStageKeys> stages;         ///< one after the other
+};
+
 /// The cable of one vehicle.
 struct CableKeys {
   Eigen::Vector3d attachment = Eigen::Vector3d::Zero();  ///< in the load, m
   std::optional<double> distance;                        ///< at the start, m; none: taut
   std::optional<double> alpha, beta;                     ///< at the start; none: of plant.initial
+  std::optional<WinchKeys> winch;                        ///< none: a constant length
+  std::optional<std::int64_t> release_ns;                ///< when it is cut; none: never
 };
 
 struct CablesKeys {
@@ -25,12 +41,32 @@ struct CablesKeys {
   std::optional<Eigen::Quaterniond> load_attitude;          ///< at the start; none: level
   Eigen::Vector3d load_rates = Eigen::Vector3d::Zero();     ///< at the start, in the load, rad/s
   double restitution = 0.0;                                 ///< of a cable that becomes taut
+  std::optional<double> ground_z;                           ///< m; none: no ground
 };
 
 /// Why the keys do not describe the cables of so many vehicles; empty if they do.
 std::string find_count_defect(const CablesKeys& keys, std::size_t vehicles);
 
 inline constexpr config::ListRange kCables{1, static_cast<int>(cables::kMaxCables), "cables"};
+
+inline constexpr config::ListRange kWinchStages{1, 1000, "stages"};
+
+template <class Map>
+void describe(Map& map, WinchStageKeys& stage) {
+  using config::kPositive, config::kRequired;
+  map.key(kRequired, "at_s", stage.at_ns, config::kNotNegative);
+  map.key(kRequired, "length_m", stage.length, kPositive);
+  map.key(kRequired, "rate_m_s", stage.rate, kPositive);
+  map.key(kRequired, "acceleration_m_s2", stage.acceleration, kPositive);
+}
+
+template <class Map>
+void describe(Map& map, WinchKeys& winch) {
+  using config::kPositive, config::kRequired;
+  map.key(kRequired, "min_length_m", winch.min_length, kPositive);
+  map.key(kRequired, "max_length_m", winch.max_length, kPositive);
+  map.key(kRequired, "stages", winch.stages, kWinchStages);
+}
 
 template <class Map>
 void describe(Map& map, CableKeys& cable) {
@@ -39,6 +75,8 @@ void describe(Map& map, CableKeys& cable) {
   map.key(kOptional, "distance_m", cable.distance, config::kPositive);
   map.key(kOptional, "alpha_rad", cable.alpha, config::kFullTurn);
   map.key(kOptional, "beta_rad", cable.beta, config::kHalfTurn);
+  map.key(kOptional, "winch", cable.winch);
+  map.key(kOptional, "release_s", cable.release_ns, config::kPositive);
 }
 
 template <class Map>
@@ -50,6 +88,7 @@ void describe_own(Map& map, config::Plant& plant, CablesKeys& keys) {
   map.key(kOptional, "load_attitude", keys.load_attitude);
   map.key(kOptional, "load_rates_rad_s", keys.load_rates);
   map.key(kOptional, "restitution", keys.restitution, config::kProbability);
+  map.key(kOptional, "ground_z_m", keys.ground_z, config::kFinite);
   config::describe_point_mass_loads(map, plant);
 }
 

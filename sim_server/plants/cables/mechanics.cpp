@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/model/forces.hpp"
 
@@ -32,7 +33,19 @@ Eigen::Vector4d calc_quaternion_rate(const Eigen::Vector4d& q, const Vector3d& w
   return rate;
 }
 
+/// Of a body that stands on the ground: see hold_still().
+bool stands(double mass) { return std::isinf(mass); }
+
 }  // namespace
+
+System hold_still(const System& system, const Members& standing) {
+  System held = system;
+  for (const std::size_t body : standing)
+    (body == kLoad ? held.load_mass : held.vehicle_mass[body]) =
+        std::numeric_limits<double>::infinity();
+  if (standing.has(kLoad)) held.inverse_inertia_L.setZero();
+  return held;
+}
 
 void add(const System& system, const Motion& start, double h, const Motion& rate, Motion& sum) {
   sum.p_WL = start.p_WL + h * rate.p_WL;
@@ -97,10 +110,17 @@ void calc_matrix(const System& system, const Geometry& geometry, const Members& 
   }
 }
 
+Vector3d calc_force(const Actions& actions, const Vehicle& vehicle, std::size_t i) {
+  Vector3d force = actions.f_Q_W[i] + actions.disturbance_W;
+  if (actions.air.rotor_drag != 0.0)
+    force += model::calc_rotor_drag(actions.f_Q_W[i], vehicle.v_W, actions.air);
+  return force;
+}
+
 void calc_free_rate(const System& system, const Motion& motion, const Actions& actions,
                     Motion& rate) {
   rate.p_WL = motion.v_WL;
-  rate.v_WL = {0.0, 0.0, system.gravity};
+  rate.v_WL = {0.0, 0.0, stands(system.load_mass) ? 0.0 : system.gravity};
   if (system.is_rigid) {
     const Vector3d& w = motion.w_WL_L;
     rate.q_WL = calc_quaternion_rate(motion.q_WL, w);
@@ -108,13 +128,10 @@ void calc_free_rate(const System& system, const Motion& motion, const Actions& a
   }
   for (std::size_t i = 0; i < system.count; ++i) {
     const Vehicle& vehicle = motion.vehicles[i];
-    Vector3d force = actions.f_Q_W[i] + actions.disturbance_W;
-    if (actions.air.rotor_drag != 0.0)
-      force += model::calc_rotor_drag(actions.f_Q_W[i], vehicle.v_W, actions.air);
     Vehicle& change = rate.vehicles[i];
     change.p_W = vehicle.v_W;
-    change.v_W = force / system.vehicle_mass[i];
-    change.v_W.z() += system.gravity;
+    change.v_W = calc_force(actions, vehicle, i) / system.vehicle_mass[i];
+    if (!stands(system.vehicle_mass[i])) change.v_W.z() += system.gravity;
     change.length = vehicle.length_rate;
     change.length_rate = actions.length_acceleration[i];
   }
@@ -158,15 +175,15 @@ void add_shifts(const System& system, const Geometry& geometry, const Vector& sh
     if (system.is_rigid) turn_L -= shifts[i] * geometry.turn_L[i];
   }
   motion.p_WL += of_load / system.load_mass;
-  if (!system.is_rigid) return;
+  if (!system.is_rigid || stands(system.load_mass)) return;
   motion.q_WL += calc_quaternion_rate(motion.q_WL, turn_L);
   motion.q_WL /= std::sqrt(motion.q_WL.squaredNorm());
 }
 
-Members find_candidates(const System& system, const Geometry& geometry, double tolerance,
+Members find_candidates(const Members& cables, const Geometry& geometry, double tolerance,
                         double rate_tolerance) {
   Members candidates;
-  for (std::size_t i = 0; i < system.count; ++i)
+  for (const std::size_t i : cables)
     if (geometry.stretch[i] >= -tolerance && geometry.stretch_rate[i] >= -rate_tolerance)
       candidates.add(i);
   return candidates;

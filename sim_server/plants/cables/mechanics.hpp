@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <optional>
 
 #include "common/model/parameters.hpp"
 #include "sim_server/plants/cables/complementarity.hpp"
@@ -22,8 +23,9 @@ struct System {
   bool is_rigid = false;        ///< false: a point load, whose attitude stays
   Eigen::Matrix3d inertia_L{};  ///< of a rigid load, kg·m²
   Eigen::Matrix3d inverse_inertia_L{};
-  double gravity = 9.8;      ///< m/s², along +z
-  double restitution = 0.0;  ///< of a cable that arrives at its length, 0 to 1
+  double gravity = 9.8;              ///< m/s², along +z
+  double restitution = 0.0;          ///< of a cable that arrives at its length, 0 to 1
+  std::optional<double> ground_z_W;  ///< bodies stand on it with their centre, m; none: no ground
 };
 
 struct Vehicle {
@@ -58,6 +60,9 @@ struct Geometry {
   Vector bend;           ///< |d² of the distance / dt²| by the motion across the cable, m/s²
 };
 
+/// `system` with the bodies `standing` infinitely heavy: nothing accelerates or turns them.
+System hold_still(const System& system, const Members& standing);
+
 /// sum = start + h rate, for the vehicles of `system`.
 void add(const System& system, const Motion& start, double h, const Motion& rate, Motion& sum);
 
@@ -68,6 +73,9 @@ void calc_geometry(const System& system, const Motion& motion, const Members& ca
 /// A of eq. (5), for the `cables`.
 void calc_matrix(const System& system, const Geometry& geometry, const Members& cables,
                  Matrix& matrix);
+
+/// Force on a vehicle besides gravity and its cable, N.
+Eigen::Vector3d calc_force(const Actions& actions, const Vehicle& vehicle, std::size_t i);
 
 /// Accelerations without a pull: of the load, its rates, and each vehicle. And b of eq. (5), for
 /// the `cables`.
@@ -93,9 +101,9 @@ struct Accelerations {
   Members taut;
 };
 
-/// The cables that may pull: those not shorter than `tolerance` below their length (m), whose ends
-/// do not approach by more than `rate_tolerance` (m/s).
-Members find_candidates(const System& system, const Geometry& geometry, double tolerance,
+/// Those of the `cables` that may pull: not shorter than `tolerance` below their length (m), and
+/// their ends do not approach by more than `rate_tolerance` (m/s).
+Members find_candidates(const Members& cables, const Geometry& geometry, double tolerance,
                         double rate_tolerance);
 
 /// The accelerations of `motion`, where of the `candidates` those pull that have to; eq. (5).

@@ -48,6 +48,7 @@ Start make_start(const CablesKeys& keys, const std::vector<PlantSetup::Vehicle>&
   system.count = vehicles.size();
   system.gravity = vehicles[0].parameters.gravity;
   system.restitution = keys.restitution;
+  system.ground_z_W = keys.ground_z;
   if (keys.load_inertia) {
     system.is_rigid = true;
     system.inertia_L = make_inertia(*keys.load_inertia, keys.load_products);

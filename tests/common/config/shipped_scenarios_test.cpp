@@ -92,7 +92,8 @@ void expect_mission(const Scenario& scenario, double z, Body body, const Vector3
 TEST(ShippedScenariosTest, AreThese) {
   std::set<std::string> names;
   for (const auto& file : list_yaml_files("config/scenarios")) names.insert(file.stem().string());
-  EXPECT_EQ(names, (std::set<std::string>{"faulty_figure_eight",
+  EXPECT_EQ(names, (std::set<std::string>{"cable_cut",
+                                          "faulty_figure_eight",
                                           "figure_eight",
                                           "figure_eight_pid",
                                           "fleet",
@@ -110,6 +111,7 @@ TEST(ShippedScenariosTest, AreThese) {
                                           "multirotor_figure_eight",
                                           "multirotor_geometric",
                                           "multirotor_setpoints",
+                                          "pick_up_and_set_down",
                                           "px4_attitude",
                                           "px4_fitted",
                                           "px4_hold",
@@ -125,7 +127,8 @@ TEST(ShippedScenariosTest, AreThese) {
                                           "setpoints",
                                           "short",
                                           "slack_drop",
-                                          "three_carry_a_triangle"}));
+                                          "three_carry_a_triangle",
+                                          "winch_down"}));
 }
 
 TEST(ShippedScenariosTest, ShareTimingAndBearTheirFilesName) {
@@ -320,7 +323,7 @@ TEST(ShippedScenariosTest, OnlyTheFleetsHaveMoreThanOneVehicle) {
   for (const auto& file : list_yaml_files("config/scenarios")) {
     const Scenario scenario = load_scenario(file);
     const std::map<std::string, std::size_t> fleets{
-        {"fleet", 10}, {"mixed_fleet", 4}, {"three_carry_a_triangle", 3}};
+        {"cable_cut", 4}, {"fleet", 10}, {"mixed_fleet", 4}, {"three_carry_a_triangle", 3}};
     const auto fleet = fleets.find(scenario.name);
     EXPECT_EQ(scenario.vehicles.size(), fleet == fleets.end() ? 1 : fleet->second) << file;
     if (scenario.plant.model.name == "cables") continue;  // whose offsets are attachments

@@ -66,7 +66,8 @@ TEST(CablesMechanicsTest, AcceleratesAsTheSecondFormulation) {
     ASSERT_TRUE(wanted);
     Geometry geometry;
     calc_geometry(scene.system, scene.motion, Members::all(scene.system.count), geometry);
-    const Members candidates = find_candidates(scene.system, geometry, 1e-9, 1e-9);
+    const Members candidates =
+        find_candidates(Members::all(scene.system.count), geometry, 1e-9, 1e-9);
     ASSERT_EQ(candidates, candidates_of(scene));
     const Accelerations got =
         calc_accelerations(scene.system, scene.motion, geometry, scene.actions, candidates);

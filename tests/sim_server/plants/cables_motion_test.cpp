@@ -7,77 +7,12 @@
 #include <cmath>
 
 #include "sim_server/plants/analytic/analytic_plant.hpp"
-#include "sim_server/plants/cables/hybrid_motion.hpp"
+#include "tests/sim_server/plants/cables_flights.hpp"
 #include "tests/sim_server/plants/cables_oracle.hpp"
 #include "tests/sim_server/plants/plant_flights.hpp"
 
 namespace sls::sim::cables {
 namespace {
-
-using Eigen::Vector3d;
-constexpr double kPi = 3.141592653589793;
-
-/// Vehicles of 1.5 kg and a point load of 0.5 kg, on cables of 1 m.
-System make_system(std::size_t count = 1) {
-  System system;
-  system.count = count;
-  system.load_mass = 0.5;
-  system.gravity = 9.8;
-  for (std::size_t i = 0; i < count; ++i) {
-    system.vehicle_mass[i] = 1.5;
-    system.attachment_L[i].setZero();
-  }
-  return system;
-}
-
-/// A load at the origin at rest.
-Motion make_motion() {
-  Motion motion;
-  motion.p_WL.setZero();
-  motion.v_WL.setZero();
-  motion.q_WL = {1.0, 0.0, 0.0, 0.0};
-  motion.w_WL_L.setZero();
-  for (Vehicle& vehicle : motion.vehicles) vehicle = {Vector3d::Zero(), Vector3d::Zero(), 1.0, 0.0};
-  return motion;
-}
-
-Actions make_actions(const Vector3d& force) {
-  Actions actions;
-  actions.f_Q_W.fill(force);
-  return actions;
-}
-
-/// An event with the time since the flight's start.
-struct Flight {
-  Flight(const System& system, const Motion& start) : motion(system, start) {}
-
-  void fly(const Actions& actions, double duration, double h = 0.001) {
-    std::vector<Event> events;
-    const auto steps = static_cast<int>(std::lround(duration / h));
-    for (int k = 0; k < steps; ++k, ++flown) {
-      events.clear();
-      motion.step(actions, h, events);
-      for (Event& event : events) {
-        event.time += flown * h;
-        happened.push_back(event);
-      }
-    }
-  }
-  Vector3d to_load() const { return motion.motion().p_WL - motion.motion().vehicles[0].p_W; }
-
-  HybridMotion motion;
-  std::vector<Event> happened;
-  int flown = 0;
-};
-
-void expect(const std::vector<Event>& events, std::vector<std::pair<double, Event::Kind>> wanted,
-            double tolerance) {
-  ASSERT_EQ(events.size(), wanted.size());
-  for (std::size_t i = 0; i < events.size(); ++i) {
-    EXPECT_NEAR(events[i].time, wanted[i].first, tolerance) << "event " << i;
-    EXPECT_EQ(events[i].kind, wanted[i].second) << "event " << i;
-  }
-}
 
 TEST(CablesMotionTest, SlackCablesLeaveAllBodiesInFreeFall) {
   System system = make_system(2);
@@ -234,30 +169,6 @@ TEST(CablesMotionTest, CirclesOnACone) {
     ASSERT_LE((flight.to_load() - direction(k * 0.001)).norm(), 1e-9) << "step " << k;
   }
   EXPECT_TRUE(flight.happened.empty());
-}
-
-/// `count` vehicles on a ring above a load, whose cables lean outwards by `angle`.
-Motion make_ring(const System& system, double angle) {
-  Motion motion = make_motion();
-  for (std::size_t i = 0; i < system.count; ++i) {
-    const double at = 2.0 * kPi * static_cast<double>(i) / static_cast<double>(system.count);
-    motion.vehicles[i].p_W =
-        system.attachment_L[i] +
-        Vector3d(std::sin(angle) * std::cos(at), std::sin(angle) * std::sin(at), -std::cos(angle));
-  }
-  return motion;
-}
-
-System make_plate(std::size_t count) {
-  System system = make_system(count);
-  system.is_rigid = true;
-  system.inertia_L = Vector3d(6e-3, 6e-3, 0.012).asDiagonal();
-  system.inverse_inertia_L = system.inertia_L.inverse();
-  for (std::size_t i = 0; i < count; ++i) {
-    const double at = 2.0 * kPi * static_cast<double>(i) / static_cast<double>(count);
-    system.attachment_L[i] = {0.3 * std::cos(at), 0.3 * std::sin(at), -0.01};
-  }
-  return system;
 }
 
 /// Forces that hold a ring of vehicles still: each carries itself and its share, and pulls

@@ -141,6 +141,117 @@ TEST(CablesPlantTest, AdvancesInAnyNumberOfCallsWithTheSameBitsThroughEvents) {
   EXPECT_LT(taut, 180) << "no cable was slack";
 }
 
+/// A vehicle of 1.5 kg that hovers with a load of 0.2 kg at z = −1.5 m below it.
+config::Scenario make_alone() {
+  config::Scenario scenario;
+  scenario.plant.model.name = "cables";
+  scenario.plant.initial.position = {0.0, 0.0, -1.5};
+  scenario.plant.own.edit<CablesKeys>().cables.resize(1);
+  return scenario;
+}
+
+TEST(CablesPlantTest, AWinchFollowsItsScheduleAtEveryTimeAndSaysSo) {
+  // 0.08 m at 0.2 m/s and 1 m/s²: ramps of 0.2 s and 0.02 m, 0.2 s between. It begins inside a
+  // step.
+  config::Scenario scenario = make_alone();
+  scenario.plant.own.edit<CablesKeys>().cables[0].winch = {
+      0.5, 2.0, {{100'500'000, 1.08, 0.2, 1.0}, {1'000'000'000, 0.6, 5.0, 2.0}}};
+  const auto plant = make(scenario);
+  const auto wanted = [](double t) {
+    const double s = t - 0.1005;
+    if (s < 0.0) return 1.0;
+    if (s < 0.2) return 1.0 + 0.5 * s * s;
+    if (s < 0.4) return 1.02 + 0.2 * (s - 0.2);
+    if (s < 0.6) return 1.08 - 0.5 * (0.6 - s) * (0.6 - s);
+    const double r = t - 1.0, half = std::sqrt(0.48 / 2.0);
+    if (r < 0.0) return 1.08;
+    if (r < half) return 1.08 - r * r;
+    if (r < 2.0 * half) return 0.6 + (2.0 * half - r) * (2.0 * half - r);
+    return 0.6;
+  };
+  std::vector<std::string> remarks;
+  for (int k = 1; k <= 2500; ++k) {
+    plant->advance({Vector3d(0.0, 0.0, -1.7 * 9.8)}, 1);
+    const model::Measurement& seen = plant->measurement(0);
+    ASSERT_NEAR(find(*plant, 0, "cable_length_m"), wanted(0.001 * k), 1e-13) << k;
+    ASSERT_NEAR((seen.p_WL - seen.p_WQ).norm(), wanted(0.001 * k), 1e-13) << k;
+    ASSERT_EQ(find(*plant, 0, "cable_taut"), 1.0) << k;
+    if (k == 400) {
+      ASSERT_NEAR(find(*plant, 0, "cable_length_rate_m_s"), 0.2, 1e-13);
+    }
+    for (const std::string& remark : plant->take_remarks(0)) remarks.push_back(remark);
+  }
+  EXPECT_EQ(find(*plant, 0, "cable_length_m"), 0.6);
+  EXPECT_EQ(find(*plant, 0, "cable_length_rate_m_s"), 0.0);
+  EXPECT_EQ(remarks, (std::vector<std::string>{"winch starts towards 1.08 m at 0.100500000 s",
+                                               "winch stops at 1.08 m at 0.700500000 s",
+                                               "winch starts towards 0.6 m at 1.000000000 s",
+                                               "winch stops at 0.6 m at 1.979795897 s"}));
+}
+
+TEST(CablesPlantTest, AReleaseInsideAStepLeavesTheLoadInFreeFall) {
+  config::Scenario scenario = make_alone();
+  scenario.plant.initial.rod.beta_dot = 0.8;
+  scenario.plant.own.edit<CablesKeys>().cables[0].release_ns = 250'400'000;
+  const auto plant = make(scenario);
+  EXPECT_EQ(find(*plant, 0, "cable_released"), 0.0);
+  const std::vector<Vector3d> hover = {Vector3d(0.0, 0.0, -1.7 * 9.8)};
+  plant->advance(hover, 251);
+  EXPECT_EQ(
+      plant->take_remarks(0),
+      (std::vector<std::string>{"cable released at 0.250400000 s; no cable carries the load"}));
+  EXPECT_EQ(find(*plant, 0, "cable_released"), 1.0);
+  EXPECT_EQ(find(*plant, 0, "cable_tension_n"), 0.0);
+  EXPECT_EQ(find(*plant, 0, "cable_taut"), 0.0);
+  const model::Measurement after = plant->measurement(0);
+  plant->advance(hover, 1000);
+  const model::Measurement& end = plant->measurement(0);
+  EXPECT_LE((end.p_WL - after.p_WL - after.v_WL - Vector3d(0.0, 0.0, 4.9)).norm(), 1e-12);
+  const double rise = 0.5 * 9.8 * (1.7 / 1.5 - 1.0);
+  EXPECT_LE((end.p_WQ - after.p_WQ - after.v_WQ + Vector3d(0.0, 0.0, rise)).norm(), 1e-12);
+  // The cut cable hangs.
+  EXPECT_EQ(end.rod.alpha, 0.0);
+  EXPECT_EQ(end.rod.beta, 0.0);
+  EXPECT_EQ(end.rod.beta_dot, 0.0);
+  EXPECT_TRUE(plant->take_remarks(0).empty());
+  // Momentum went on through the cut: what both had 1 ms before, and gravity and force since.
+  const auto before = make(scenario);
+  before->advance(hover, 250);
+  const model::Measurement& held = before->measurement(0);
+  const Vector3d momentum = 1.5 * held.v_WQ + 0.2 * held.v_WL;
+  EXPECT_LE((1.5 * after.v_WQ + 0.2 * after.v_WL - momentum).norm(), 1e-14);
+}
+
+TEST(CablesPlantTest, TellsWhatStandsOnTheGround) {
+  config::Scenario scenario = make_alone();
+  auto& keys = scenario.plant.own.edit<CablesKeys>();
+  keys.ground_z = 0.25;
+  keys.cables[0].distance = 0.6;
+  scenario.plant.initial.position.z() = 0.25;
+  const auto plant = make(scenario);
+  EXPECT_EQ(find(*plant, 0, "load_on_ground"), 1.0);
+  EXPECT_EQ(find(*plant, 0, "vehicle_on_ground"), 0.0);
+  // Up at 2 m/s² for 0.4 m of slack, then with the load, then all falls.
+  plant->advance({Vector3d(0.0, 0.0, -1.5 * 11.8)}, 800);
+  EXPECT_EQ(find(*plant, 0, "load_on_ground"), 0.0);
+  plant->advance({Vector3d(0.0, 0.0, 0.0)}, 1000);
+  EXPECT_EQ(find(*plant, 0, "load_on_ground"), 1.0);
+  EXPECT_EQ(find(*plant, 0, "vehicle_on_ground"), 1.0);
+  EXPECT_EQ(plant->measurement(0).p_WL, Vector3d(0.0, 0.0, 0.25));
+  const std::vector<std::string> remarks = plant->take_remarks(0);
+  ASSERT_EQ(remarks.size(), 5u);
+  EXPECT_EQ(remarks[0].substr(0, 24), "cable taut at 0.63245553");
+  EXPECT_EQ(remarks[1].substr(0, 25), "load lifts off at 0.63245");
+  EXPECT_EQ(remarks[2], "cable slack at 0.800000000 s; no cable carries the load");
+  EXPECT_EQ(remarks[3].substr(0, 18), "load on the ground");
+  EXPECT_EQ(remarks[4].substr(0, 21), "vehicle on the ground");
+}
+
+TEST(CablesPlantTest, HasNoSignalsOfWhatTheScenarioHasNot) {
+  const auto plant = make(make_alone());
+  EXPECT_EQ(plant->signals().size(), 10u);
+}
+
 TEST(CablesPlantTest, RefusesToFlyOneVehicleOfAGroupAlone) {
   const config::Scenario scenario = make_bar();
   try {
