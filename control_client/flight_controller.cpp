@@ -1,6 +1,7 @@
 #include "control_client/flight_controller.hpp"
 
 #include <cstring>
+#include <optional>
 #include <stdexcept>
 
 #include "control_client/drag_feed_forward.hpp"
@@ -32,6 +33,12 @@ bool are_equal(const LawOutput& a, const LawOutput& b) {
          are_equal(a.memory.data(), b.memory.data(), a.memory.size());
 }
 
+std::optional<CableEnd> find_cable_end(const config::Scenario& scenario, std::uint32_t vehicle_id) {
+  if (!scenario.shared_load) return {};
+  const model::SharedLoad& load = *scenario.shared_load;
+  return CableEnd{load.q_WL, load.cables.at(vehicle_id).attachment_L};
+}
+
 }  // namespace
 
 struct FlightController::Parts {
@@ -41,8 +48,9 @@ struct FlightController::Parts {
         vehicle_id(vehicle),
         plant_rod_length(scenario.vehicle.rod_length),
         period(static_cast<double>(scenario.sync.period_ns) / 1e9),
-        mission(scenario.mission, scenario.sync.period_ns),
-        law(make_law({scenario.controller, period, vehicle_id, scenario.folder})),
+        mission(scenario.mission, scenario.sync.period_ns, find_cable_end(scenario, vehicle_id)),
+        law(make_law(
+            {scenario.controller, period, vehicle_id, scenario.folder, scenario.shared_load})),
         checks_purity(checks_purity_always) {
     if (law->memory_size() > model::kMaxNumbers)
       throw config::ConfigError(controller.law.describe_place("controller.law") +
@@ -54,7 +62,7 @@ struct FlightController::Parts {
 
   /// Force and memory for an answer whose reference is known.
   void fly(std::uint64_t step, const model::Measurement& state, const model::Numbers& memory,
-           model::Answer& answer) const;
+           const MissionProgress& progress, model::Answer& answer) const;
   LawOutput calc_law(const LawInput& input) const;
 
   config::Controller controller;
@@ -79,10 +87,17 @@ LawOutput FlightController::Parts::calc_law(const LawInput& input) const {
 }
 
 void FlightController::Parts::fly(std::uint64_t step, const model::Measurement& state,
-                                  const model::Numbers& memory, model::Answer& answer) const {
-  LawInput input{state,        answer.reference,
-                 memory,       step,
-                 answer.stage, static_cast<double>(step - answer.memory.stage_start_step) * period};
+                                  const model::Numbers& memory, const MissionProgress& progress,
+                                  model::Answer& answer) const {
+  LawInput input{state,
+                 progress.reference,
+                 memory,
+                 step,
+                 progress.stage,
+                 0.0,
+                 progress.load_reference,
+                 progress.load_attitude};
+  input.stage_time = static_cast<double>(step - progress.stage_start_step) * period;
   input.state.rod = calc_wired_angles(state.rod, controller.state_wiring, plant_rod_length);
   if (memory.size() == 0) input.memory.setZero(law->memory_size());  // step 0
 
@@ -132,7 +147,7 @@ model::Answer FlightController::calc_answer(std::uint64_t step, const model::Mea
   } else if (progress.phase == MissionPhase::kFailed) {
     fail(answer, ErrorCode::kStageTimeout);
   } else {
-    parts_->fly(step, state, memory.numbers, answer);
+    parts_->fly(step, state, memory.numbers, progress, answer);
   }
   return answer;
 }

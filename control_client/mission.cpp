@@ -27,15 +27,17 @@ double to_seconds(std::int64_t nanoseconds) { return static_cast<double>(nanosec
 
 }  // namespace
 
-Mission::Mission(const std::vector<config::Stage>& stages, std::int64_t period_ns)
-    : period_ns_(period_ns) {
+Mission::Mission(const std::vector<config::Stage>& stages, std::int64_t period_ns,
+                 const std::optional<CableEnd>& end)
+    : period_ns_(period_ns), end_(end) {
   if (stages.empty()) throw config::ConfigError("mission: expected at least one stage, got none");
   if (period_ns <= 0) {
     throw config::ConfigError("sync.period_s: expected > 0, got " + std::to_string(period_ns) +
                               " ns");
   }
   for (const config::Stage& stage : stages) {
-    stages_.push_back({stage.name, make_reference_trajectory(stage.reference), stage.leave});
+    stages_.push_back({stage.name, make_reference_trajectory(stage.reference), {}, stage.leave});
+    if (end) stages_.back().attitude.emplace(stage.reference, end->q_WL);
   }
 }
 
@@ -50,6 +52,16 @@ std::int64_t Mission::calc_elapsed_ns(std::uint64_t step, std::uint64_t start_st
   return static_cast<std::int64_t>(steps) * period_ns_;
 }
 
+void Mission::calc_reference(const Stage& stage, double time, MissionProgress& progress) const {
+  progress.reference = progress.load_reference = stage.trajectory->calc(time);
+  if (!stage.attitude) return;
+  progress.load_attitude = stage.attitude->calc(time);
+  progress.load_reference.position -= end_->q_WL.toRotationMatrix() * end_->attachment_L;
+  if (stage.attitude->turns())  // else the end is where the stage has it, to the last bit
+    progress.reference =
+        calc_end_reference(progress.load_reference, progress.load_attitude, end_->attachment_L);
+}
+
 MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoadState& state,
                                        const model::ControllerMemory& memory) const {
   const auto end = static_cast<std::uint32_t>(stages_.size());
@@ -62,7 +74,7 @@ MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoa
   while (true) {
     const Stage& stage = stages_[progress.stage];
     const std::int64_t elapsed_ns = calc_elapsed_ns(step, progress.stage_start_step);
-    progress.reference = stage.trajectory->calc(to_seconds(elapsed_ns));
+    calc_reference(stage, to_seconds(elapsed_ns), progress);
     StageOutcome outcome = StageOutcome::kLeft;  // a finished mission stays finished
     if (memory.stage < end)
       outcome = std::visit(

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,12 +23,23 @@ struct MissionProgress {
   std::uint64_t stage_start_step = 0;
   model::MissionPhase phase = model::MissionPhase::kRunning;
   model::Reference reference;
+  /// The same of the load where several vehicles carry one; else `reference` and level.
+  model::Reference load_reference;
+  model::AttitudeReference load_attitude;
+};
+
+/// The end of a vehicle's own cable at a load that several vehicles carry.
+struct CableEnd {
+  Eigen::Quaterniond q_WL;       ///< attitude of the load at step 0
+  Eigen::Vector3d attachment_L;  ///< in the load, from its centre of mass, m
 };
 
 class Mission {
  public:
   /// @throws config::ConfigError without a stage or without a positive period.
-  Mission(const std::vector<config::Stage>& stages, std::int64_t period_ns);
+  /// With an `end`, the stages have the references of that end for a load as at step 0.
+  Mission(const std::vector<config::Stage>& stages, std::int64_t period_ns,
+          const std::optional<CableEnd>& end = {});
 
   /// True if `memory` names a stage, or the end of the mission, that began at `step` or earlier.
   bool is_possible(std::uint64_t step, const model::ControllerMemory& memory) const;
@@ -44,14 +56,17 @@ class Mission {
   struct Stage {
     std::string name;
     std::unique_ptr<const ReferenceTrajectory> trajectory;
+    std::optional<AttitudeTrajectory> attitude;  // of a shared load
     config::LeaveCondition leave;
   };
 
+  void calc_reference(const Stage& stage, double time, MissionProgress& progress) const;
   /// Time since `start_step`, whole nanoseconds; the largest number if it does not fit.
   std::int64_t calc_elapsed_ns(std::uint64_t step, std::uint64_t start_step) const;
 
   std::vector<Stage> stages_;
   std::int64_t period_ns_;
+  std::optional<CableEnd> end_;
 };
 
 }  // namespace sls::control

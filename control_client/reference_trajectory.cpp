@@ -1,6 +1,9 @@
 #include "control_client/reference_trajectory.hpp"
 
+#include <cmath>
+
 #include "common/model/math.hpp"
+#include "common/model/rotation.hpp"
 
 namespace sls::control {
 namespace {
@@ -24,6 +27,14 @@ std::unique_ptr<const ReferenceTrajectory> make(const config::FigureEightReferen
 }
 std::unique_ptr<const ReferenceTrajectory> make(const config::RestToRestReference& config) {
   return std::make_unique<RestToRest>(config);
+}
+
+Eigen::Quaterniond to_quaternion(const config::StageAttitude& attitude,
+                                 const Eigen::Quaterniond& otherwise) {
+  if (!attitude) return otherwise;
+  return model::make_turn(attitude->z(), Eigen::Vector3d::UnitZ()) *
+         model::make_turn(attitude->y(), Eigen::Vector3d::UnitY()) *
+         model::make_turn(attitude->x(), Eigen::Vector3d::UnitX());
 }
 
 }  // namespace
@@ -74,6 +85,68 @@ model::Reference RestToRest::calc(double time) const {
 std::unique_ptr<const ReferenceTrajectory> make_reference_trajectory(
     const config::StageReference& reference) {
   return std::visit([](const auto& config) { return make(config); }, reference);
+}
+
+AttitudeTrajectory::AttitudeTrajectory(const config::StageReference& reference,
+                                       const Eigen::Quaterniond& q_start)
+    : q_from_(q_start) {
+  const auto begin_with = [&](const config::StageAttitude& attitude) {
+    turns_ = attitude.has_value();
+    q_from_ = to_quaternion(attitude, q_start);
+  };
+  if (const auto* constant = std::get_if<config::ConstantReference>(&reference))
+    begin_with(constant->attitude);
+  if (const auto* eight = std::get_if<config::FigureEightReference>(&reference))
+    begin_with(eight->attitude);
+  if (const auto* rest = std::get_if<config::RestToRestReference>(&reference)) {
+    begin_with(rest->from_attitude);
+    turns_ = turns_ || rest->to_attitude;
+    turn_to(to_quaternion(rest->to_attitude, q_start), rest->duration_s);
+  }
+}
+
+void AttitudeTrajectory::turn_to(const Eigen::Quaterniond& q_to, double duration_s) {
+  Eigen::Quaterniond turn = q_from_.conjugate() * q_to;
+  if (turn.w() < 0.0) turn.coeffs() *= -1.0;  // the shorter way
+  const double sine = std::sqrt(turn.vec().squaredNorm());
+  constexpr double kRounding = 1e-15;  // of products of unit quaternions
+  if (sine <= kRounding) return;
+  axis_ = turn.vec() / sine;
+  const double angle = 2.0 * math::atan2(sine, turn.w());
+  config::RestToRestReference way;
+  way.to.x() = angle;
+  way.duration_s = duration_s;
+  angle_.emplace(way);
+}
+
+model::AttitudeReference AttitudeTrajectory::calc(double time) const {
+  model::AttitudeReference attitude;
+  attitude.axis_L = axis_;
+  Eigen::Quaterniond q = q_from_;
+  if (angle_) {
+    const model::Reference angle = angle_->calc(time);
+    attitude.turn << angle.velocity.x(), angle.acceleration.x(), angle.jerk.x(), angle.snap.x();
+    q = q_from_ * model::make_turn(angle.position.x(), axis_);
+  }
+  attitude.R_WL = q.toRotationMatrix();
+  return attitude;
+}
+
+model::Reference calc_end_reference(const model::Reference& load,
+                                    const model::AttitudeReference& attitude,
+                                    const Eigen::Vector3d& attachment_L) {
+  const Eigen::Matrix3d& R = attitude.R_WL;
+  const Eigen::Vector3d across = attitude.axis_L.cross(attachment_L);  // the first derivative
+  const Eigen::Vector3d first = R * across, second = R * attitude.axis_L.cross(across);
+  const double w = attitude.turn[0], a = attitude.turn[1], j = attitude.turn[2],
+               s = attitude.turn[3];
+  model::Reference end = load;
+  end.position += R * attachment_L;
+  end.velocity += w * first;
+  end.acceleration += a * first + w * w * second;
+  end.jerk += (j - w * w * w) * first + 3.0 * w * a * second;
+  end.snap += (s - 6.0 * w * w * a) * first + (4.0 * w * j + 3.0 * a * a - w * w * w * w) * second;
+  return end;
 }
 
 }  // namespace sls::control

@@ -1,11 +1,14 @@
 /// Desired motions of the load. A new one derives from `ReferenceTrajectory` and gets a line in
-/// `make_reference_trajectory`. Source: README.md, eqs. (12) and (13).
+/// `make_reference_trajectory`. Source: README.md, eqs. (12), (13), (17) and (18).
 #pragma once
 
+#include <Eigen/Geometry>
 #include <memory>
+#include <optional>
 
 #include "common/config/scenario.hpp"
 #include "common/model/reference.hpp"
+#include "common/model/shared_load.hpp"
 
 namespace sls::control {
 
@@ -50,5 +53,29 @@ class RestToRest : public ReferenceTrajectory {
 
 std::unique_ptr<const ReferenceTrajectory> make_reference_trajectory(
     const config::StageReference& reference);
+
+/// The desired attitude of a shared load in one stage. Eq. (17).
+class AttitudeTrajectory {
+ public:
+  /// `q_start` is the load's attitude at step 0, which a stage without a key holds.
+  AttitudeTrajectory(const config::StageReference& reference, const Eigen::Quaterniond& q_start);
+  model::AttitudeReference calc(double time) const;
+  /// False if the load is to keep the attitude of step 0.
+  bool turns() const { return turns_; }
+
+ private:
+  void turn_to(const Eigen::Quaterniond& q_to, double duration_s);
+
+  bool turns_ = false;
+  Eigen::Quaterniond q_from_;
+  Eigen::Vector3d axis_ = Eigen::Vector3d::UnitZ();  // in the load
+  std::optional<RestToRest> angle_;                  // its x, rad; none: the load does not turn
+};
+
+/// The desired motion of the point `attachment_L` of a load whose centre of mass follows `load`.
+/// Eq. (18).
+model::Reference calc_end_reference(const model::Reference& load,
+                                    const model::AttitudeReference& attitude,
+                                    const Eigen::Vector3d& attachment_L);
 
 }  // namespace sls::control

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,8 @@ class ModelKeys {
   virtual bool has_attitude() const { return false; }
   /// The shape of the vehicles of a plant.
   virtual VehicleShape calc_shape(const Section&) const { return {}; }
+  /// The one load of a plant whose vehicles carry it together. Called after `check`.
+  virtual std::optional<model::SharedLoad> calc_shared_load(const Scenario&) const { return {}; }
 };
 
 /// The keys of each model, by name.

@@ -226,6 +226,18 @@ void check_estimator(const Scenario& scenario, const Places& places) {
           (is_tilted ? to_yaml_value(error.tilt) : to_yaml_value(error.yaw)));
 }
 
+/// Attitudes of stages are those of a rigid load that vehicles carry together.
+void check_attitudes(const Scenario& scenario, const Places& places) {
+  if (scenario.shared_load && scenario.shared_load->inertia_L) return;
+  for (std::size_t i = 0; i < scenario.mission.size(); ++i)
+    for (const char* key : {"attitude_rad", "from_attitude_rad", "to_attitude_rad"}) {
+      const std::string path = to_stage_path(i) + "." + scenario.mission[i].kind + "." + key;
+      if (places.has(path))
+        throw places.make_error_at(
+            path, "of a load that is a rigid body and hangs on cables (plant.load_inertia_kg_m2)");
+    }
+}
+
 /// Moves the start and the references of the vehicle. Leave conditions are relative to the
 /// reference, so they move too.
 void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
@@ -270,7 +282,8 @@ std::string read_config_file(const std::filesystem::path& file, const std::strin
 }
 
 Scenario load_scenario(const std::filesystem::path& file, const Models& models) {
-  Scenario scenario = parse_scenario(read_config_file(file, "a scenario file"), file.string(), models);
+  Scenario scenario =
+      parse_scenario(read_config_file(file, "a scenario file"), file.string(), models);
   scenario.folder = file.parent_path();
   return scenario;
 }
@@ -293,7 +306,10 @@ Scenario read_scenario(const YamlNode& root, const std::string& place, const std
   check_autopilot(scenario, places);
   check_sensing(scenario, places);
   check_estimator(scenario, places);
-  find_model_keys(places.models().plants, scenario.plant.model).check(scenario, places);
+  const auto& plant = find_model_keys(places.models().plants, scenario.plant.model);
+  plant.check(scenario, places);
+  scenario.shared_load = plant.calc_shared_load(scenario);
+  check_attitudes(scenario, places);
   find_model_keys(places.models().laws, scenario.controller.law).check(scenario, places);
   scenario.text = text;
   scenario.sha256 = calc_sha256(text);

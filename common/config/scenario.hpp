@@ -20,6 +20,7 @@
 #include "common/config/config_error.hpp"
 #include "common/model/offset.hpp"
 #include "common/model/parameters.hpp"
+#include "common/model/shared_load.hpp"
 #include "common/model/state.hpp"
 
 namespace sls::config {
@@ -295,9 +296,14 @@ struct Controller {
 
 // --- mission -----------------------------------------------------------------------------------
 
+/// Roll, pitch, yaw (rad) of a rigid load that several vehicles carry; none: as at step 0. The load
+/// is turned by yaw about z, then by pitch about its y, then by roll about its x.
+using StageAttitude = std::optional<Eigen::Vector3d>;
+
 /// Constant reference: the stages `hold` and `set_point`.
 struct ConstantReference {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< m
+  StageAttitude attitude = {};
 };
 
 /// offset + (a_x sin 2πt/T, a_y sin 4πt/T, a_z sin 2πt/T).
@@ -305,6 +311,7 @@ struct FigureEightReference {
   Eigen::Vector3d amplitude = Eigen::Vector3d::Zero();  ///< m
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();     ///< m
   double period_s = 16.0;                               ///< T of one lap, s
+  StageAttitude attitude = {};
 };
 
 /// Ninth-degree polynomial from rest to rest in `duration_s`, then constant.
@@ -312,6 +319,8 @@ struct RestToRestReference {
   Eigen::Vector3d from = Eigen::Vector3d::Zero();  ///< m
   Eigen::Vector3d to = Eigen::Vector3d::Zero();    ///< m
   double duration_s = 1.0;
+  StageAttitude from_attitude = {};
+  StageAttitude to_attitude = {};
 };
 
 using StageReference = std::variant<ConstantReference, FigureEightReference, RestToRestReference>;
@@ -366,6 +375,9 @@ struct Scenario {
   Estimator estimator;
   std::vector<Fault> faults;  ///< those of one channel act in this order
   Record record;
+
+  /// Follows from plant and vehicles when the file is read: of plants with such a load.
+  std::optional<model::SharedLoad> shared_load;
 
   std::string text;              ///< the file's bytes
   std::filesystem::path folder;  ///< of the file: paths in it are relative to that

@@ -297,6 +297,7 @@ void describe(Map& map, Controller& controller) {
 template <class Map>
 void describe(Map& map, ConstantReference& reference) {
   map.key(kRequired, "position_m", reference.position);
+  map.key(kOptional, "attitude_rad", reference.attitude, kFullTurn);
 }
 
 template <class Map>
@@ -304,6 +305,7 @@ void describe(Map& map, FigureEightReference& reference) {
   map.key(kRequired, "amplitude_m", reference.amplitude);
   map.key(kOptional, "offset_m", reference.offset);
   map.key(kRequired, "period_s", reference.period_s, kPositive);
+  map.key(kOptional, "attitude_rad", reference.attitude, kFullTurn);
 }
 
 template <class Map>
@@ -311,6 +313,8 @@ void describe(Map& map, RestToRestReference& reference) {
   map.key(kRequired, "from_m", reference.from);
   map.key(kRequired, "to_m", reference.to);
   map.key(kRequired, "duration_s", reference.duration_s, kPositive);
+  map.key(kOptional, "from_attitude_rad", reference.from_attitude, kFullTurn);
+  map.key(kOptional, "to_attitude_rad", reference.to_attitude, kFullTurn);
 }
 
 template <class Map>

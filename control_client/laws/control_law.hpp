@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "common/config/scenario.hpp"
@@ -16,6 +17,7 @@
 #include "common/model/math.hpp"
 #include "common/model/measurement.hpp"
 #include "common/model/reference.hpp"
+#include "common/model/shared_load.hpp"
 
 namespace sls::control {
 
@@ -47,6 +49,10 @@ struct LawInput {
   std::uint64_t step = 0;
   std::uint32_t stage = 0;  ///< stage of the mission, to which `reference` belongs
   double stage_time = 0.0;  ///< s since the stage began
+
+  /// The references of the load where several vehicles carry one; else `reference` and level.
+  model::Reference load_reference;
+  model::AttitudeReference load_attitude;
 };
 
 struct LawOutput {
@@ -69,9 +75,10 @@ class ControlLaw {
 /// The inputs from which a law is made.
 struct LawSetup {
   config::Controller controller;
-  double period = 0.0;           ///< control period in force, s
-  std::uint32_t vehicle_id = 0;  ///< the vehicle that the law flies
-  std::filesystem::path folder;  ///< of the scenario file
+  double period = 0.0;                           ///< control period in force, s
+  std::uint32_t vehicle_id = 0;                  ///< the vehicle that the law flies
+  std::filesystem::path folder;                  ///< of the scenario file
+  std::optional<model::SharedLoad> shared_load;  ///< of plants whose vehicles carry one together
 };
 
 /// Makes the law of a vehicle.

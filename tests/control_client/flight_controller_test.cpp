@@ -316,9 +316,9 @@ TEST(FlightControllerTest, RefusesALawItDoesNotKnowAndWeightsWithoutSolution) {
     const FlightController controller(scenario);
     FAIL() << "took a law that does not exist";
   } catch (const config::ConfigError& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "controller.law: expected pid, qsf or a shared library (a path ending in .so), got lqr");
+    EXPECT_STREQ(error.what(),
+                 "controller.law: expected cooperative, pid, qsf or a shared library (a path "
+                 "ending in .so), got lqr");
   }
   scenario.controller.law.name = "qsf";
   scenario.controller.own = QsfKeys{LqrWeights{-1.0, 5.0}};

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -243,6 +244,31 @@ TEST(MissionTest, TimeBeyondTheClocksRangeEndsTheStageInsteadOfOverflowing) {
 TEST(MissionTest, NeedsAStageAndAPeriod) {
   EXPECT_THROW(Mission({}, kPeriod), config::ConfigError);
   EXPECT_THROW(Mission({make_hold({0, 0, 0}, kSecond)}, 0), config::ConfigError);
+}
+
+TEST(MissionTest, AStageThatTurnsASharedLoadMovesTheEndOfTheCableAboutItsCentre) {
+  const Vector3d attachment(0.3, 0.1, -0.05), centre(1.0, 2.0, -3.0);
+  config::Stage level = make_hold(centre + attachment, kSecond), turned = level;
+  auto& hold = std::get<config::ConstantReference>(turned.reference);
+  hold.attitude = Vector3d(0.0, 0.0, 1.5);
+  const Mission mission({level, turned}, kPeriod,
+                        CableEnd{Eigen::Quaterniond::Identity(), attachment});
+  const MissionProgress first = mission.calc_progress(0, {}, {});
+  EXPECT_EQ(first.reference.position, Vector3d(centre + attachment));  // to the last bit
+  EXPECT_LE((first.load_reference.position - centre).norm(), 1e-15);
+  EXPECT_EQ(first.load_attitude.R_WL, Eigen::Matrix3d::Identity());
+  model::ControllerMemory memory;
+  memory.stage = 1;
+  const MissionProgress second = mission.calc_progress(0, {}, memory);
+  const double c = std::cos(1.5), s = std::sin(1.5);
+  EXPECT_LE((second.load_reference.position - centre).norm(), 1e-15);
+  EXPECT_LE(
+      (second.reference.position - centre - Vector3d(0.3 * c - 0.1 * s, 0.3 * s + 0.1 * c, -0.05))
+          .norm(),
+      1e-15);
+  // Without a shared load the references are the stage's own.
+  const MissionProgress alone = Mission({level}, kPeriod).calc_progress(0, {}, {});
+  EXPECT_EQ(alone.load_reference.position, alone.reference.position);
 }
 
 }  // namespace

@@ -146,5 +146,62 @@ TEST(ReferenceTrajectoryTest, RestToRestIsSymmetricAboutItsMiddle) {
   }
 }
 
+// --- attitude of a shared load -------------------------------------------------------------------
+
+Eigen::Quaterniond to_quaternion(double roll, double pitch, double yaw) {
+  return Eigen::AngleAxisd(yaw, Vector3d::UnitZ()) * Eigen::AngleAxisd(pitch, Vector3d::UnitY()) *
+         Eigen::AngleAxisd(roll, Vector3d::UnitX());
+}
+
+config::RestToRestReference make_turn() {
+  config::RestToRestReference turn = make_rest_to_rest();
+  turn.from_attitude = Vector3d(0.3, -0.2, 3.0);
+  turn.to_attitude = Vector3d(-0.1, 0.4, -2.5);
+  return turn;
+}
+
+TEST(AttitudeTrajectoryTest, TurnsFromTheFirstAttitudeToTheSecondByTheShorterWay) {
+  const AttitudeTrajectory turn(make_turn(), Eigen::Quaterniond::Identity());
+  const Eigen::Quaterniond from = to_quaternion(0.3, -0.2, 3.0),
+                           to = to_quaternion(-0.1, 0.4, -2.5);
+  EXPECT_TRUE(turn.turns());
+  for (const double before : {-1.0, 0.0})
+    EXPECT_LE((turn.calc(before).R_WL - from.toRotationMatrix()).norm(), 1e-15 * 10.0);
+  for (const double after : {3.0, 4.0}) {
+    EXPECT_LE((turn.calc(after).R_WL - to.toRotationMatrix()).norm(), 1e-15 * 10.0);
+    EXPECT_EQ(turn.calc(after).turn, Eigen::Vector4d::Zero());
+  }
+  // Half-way in time is half-way in the turn.
+  EXPECT_LE((turn.calc(1.5).R_WL - from.slerp(0.5, to).toRotationMatrix()).norm(), 1e-14);
+}
+
+TEST(AttitudeTrajectoryTest, AStageWithoutAnAttitudeHoldsThatOfStepZero) {
+  const Eigen::Quaterniond start = to_quaternion(0.1, 0.2, 0.3);
+  const AttitudeTrajectory rest(config::RestToRestReference(make_rest_to_rest()), start),
+      eight(make_eight(), start), hold(config::ConstantReference{}, start);
+  for (const AttitudeTrajectory* trajectory : {&rest, &eight, &hold}) {
+    EXPECT_FALSE(trajectory->turns());
+    EXPECT_EQ(trajectory->calc(1.0).R_WL, start.toRotationMatrix());
+    EXPECT_EQ(trajectory->calc(1.0).turn, Eigen::Vector4d::Zero());
+  }
+  config::FigureEightReference turned = make_eight();
+  turned.attitude = Vector3d(0.0, 0.0, 1.0);
+  EXPECT_LE((AttitudeTrajectory(turned, start).calc(1.0).R_WL -
+             to_quaternion(0.0, 0.0, 1.0).toRotationMatrix())
+                .norm(),
+            1e-15 * 10.0);
+}
+
+TEST(AttitudeTrajectoryTest, TheEndOfACableMovesWithExactDerivatives) {
+  struct End : ReferenceTrajectory {
+    RestToRest centre{make_turn()};
+    AttitudeTrajectory attitude{make_turn(), Eigen::Quaterniond::Identity()};
+    model::Reference calc(double time) const override {
+      return calc_end_reference(centre.calc(time), attitude.calc(time), Vector3d(0.4, -0.3, 0.2));
+    }
+  };
+  for (const double t : {0.4, 1.1, 2.3}) expect_consistent_derivatives(End(), t, 0.01, 1e-9);
+}
+
 }  // namespace
 }  // namespace sls::control

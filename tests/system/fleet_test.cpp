@@ -170,6 +170,32 @@ TEST_F(FleetTest, AKilledClientOfOneHalfIsReplacedByAStandbyAndNothingElseChange
   for (const char* id : {"0", "1", "2"}) EXPECT_EQ(last_client[id], "standby") << id;
 }
 
+TEST_F(FleetTest, OneOfThreeClientsThatCarryALoadDiesAndNoByteChanges) {
+  const std::string file = scenario("one_controller_dies");
+  const auto recorder = start("recorder", {"--out", recording()});
+  const auto server = start("sim_server", {"--scenario", file, kManySteps[0], kManySteps[1]});
+  std::vector<std::unique_ptr<Process>> clients;
+  for (const char* vehicle : {"0", "1", "2"})
+    clients.push_back(start("control_client", {"--scenario", file, "--vehicles", vehicle, "--name",
+                                               std::string("of-") + vehicle, "--strength", "2"}));
+  const auto standby = start("control_client", {"--scenario", file, "--vehicles", "1", "--name",
+                                                "standby", "--strength", "1"});
+  const auto has_grown = [&] {
+    return fs::exists(recording() + "/state.csv") &&
+           fs::file_size(recording() + "/state.csv") > 100'000;
+  };
+  ASSERT_TRUE(wait_until(has_grown)) << server->output();
+  clients[1]->kill();
+  EXPECT_EQ(server->wait(), 0) << server->output();
+  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  EXPECT_EQ(clients[0]->wait(), 0) << clients[0]->output();
+  EXPECT_EQ(clients[2]->wait(), 0) << clients[2]->output();
+  EXPECT_EQ(standby->wait(), 0) << standby->output();
+  EXPECT_TRUE(holds(server->output(), "'standby' takes over from 'of-1' (vehicle 1)"))
+      << server->output();
+  expect_undisturbed(recording(), file, kManySteps);
+}
+
 TEST_F(FleetTest, VehiclesThatAreNotInTheScenarioAreRefused) {
   const std::string file = make_fleet_scenario(folder_);
   const auto expect_refused = [](const std::vector<std::string>& command,

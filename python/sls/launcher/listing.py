@@ -10,6 +10,7 @@ from sls.launcher.place import ROOT, list_names
 # As control_client/laws/laws.def and sim_server/plants/plants.def name them.
 LAWS = {
     "qsf": "quasi-static feedback linearisation; the default",
+    "cooperative": "the pose of one load, carried by several vehicles",
     "pid": "a cascade for position, velocity and rod angle",
     "PATH.so": "an own law in C, C++ or generated code: examples/my_controller",
 }

@@ -92,6 +92,19 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
       check_body("vehicle " + std::to_string(i), motion.vehicles[i].p_W, motion.vehicles[i].v_W);
   }
 
+  std::optional<model::SharedLoad> calc_shared_load(
+      const config::Scenario& scenario) const override {
+    const auto& keys = scenario.plant.own.get<CablesKeys>();
+    model::SharedLoad load;
+    if (keys.load_inertia) load.inertia_L = make_inertia(*keys.load_inertia, keys.load_products);
+    load.q_WL = keys.load_attitude.value_or(load.q_WL);
+    for (std::size_t i = 0; i < scenario.vehicles.size(); ++i)
+      load.cables.push_back(
+          {scenario.vehicles[i].load_mass.value_or(scenario.vehicle.load_mass),
+           keys.cables.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : keys.cables[i].attachment});
+    return load;
+  }
+
   static void check_load(const CablesKeys& keys, const config::Places& places) {
     if (keys.load_inertia) {
       const std::string defect =

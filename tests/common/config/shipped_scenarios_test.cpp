@@ -97,6 +97,7 @@ TEST(ShippedScenariosTest, AreThese) {
                                           "figure_eight",
                                           "figure_eight_pid",
                                           "fleet",
+                                          "four_carry_a_box",
                                           "gazebo_correct_wiring",
                                           "gazebo_corrected",
                                           "gazebo_legacy",
@@ -108,6 +109,7 @@ TEST(ShippedScenariosTest, AreThese) {
                                           "matlab_setpoint_3",
                                           "mission",
                                           "mixed_fleet",
+                                          "one_controller_dies",
                                           "multirotor_figure_eight",
                                           "multirotor_geometric",
                                           "multirotor_setpoints",
@@ -126,8 +128,10 @@ TEST(ShippedScenariosTest, AreThese) {
                                           "rotor_drag_without_feed_forward",
                                           "setpoints",
                                           "short",
+                                          "six_carry_a_box",
                                           "slack_drop",
                                           "three_carry_a_triangle",
+                                          "three_carry_a_triangle_pose",
                                           "winch_down"}));
 }
 
@@ -322,8 +326,14 @@ TEST(ShippedScenariosTest, OnlyTheFaultyOneHasFaults) {
 TEST(ShippedScenariosTest, OnlyTheFleetsHaveMoreThanOneVehicle) {
   for (const auto& file : list_yaml_files("config/scenarios")) {
     const Scenario scenario = load_scenario(file);
-    const std::map<std::string, std::size_t> fleets{
-        {"cable_cut", 4}, {"fleet", 10}, {"mixed_fleet", 4}, {"three_carry_a_triangle", 3}};
+    const std::map<std::string, std::size_t> fleets{{"cable_cut", 4},
+                                                    {"fleet", 10},
+                                                    {"four_carry_a_box", 4},
+                                                    {"mixed_fleet", 4},
+                                                    {"one_controller_dies", 3},
+                                                    {"six_carry_a_box", 6},
+                                                    {"three_carry_a_triangle", 3},
+                                                    {"three_carry_a_triangle_pose", 3}};
     const auto fleet = fleets.find(scenario.name);
     EXPECT_EQ(scenario.vehicles.size(), fleet == fleets.end() ? 1 : fleet->second) << file;
     if (scenario.plant.model.name == "cables") continue;  // whose offsets are attachments

@@ -41,9 +41,10 @@ TEST(AddedModelTest, ALawIsItsSourcesAndALineInTheList) {
 }
 
 TEST(AddedModelTest, MessagesNameIt) {
-  EXPECT_EQ(find_error("{ law: unsteady }"),
-            "added:4: controller.law: expected pid, qsf, steady or a shared library (a path ending "
-            "in .so), got unsteady; did you mean 'steady'?");
+  EXPECT_EQ(
+      find_error("{ law: unsteady }"),
+      "added:4: controller.law: expected cooperative, pid, qsf, steady or a shared library (a "
+      "path ending in .so), got unsteady; did you mean 'steady'?");
   EXPECT_EQ(find_error("{ law: steady, share: 0 }"),
             "added:4: controller.share: expected > 0, got 0");
   EXPECT_EQ(find_error("{ law: pid, share: 1 }"),
