@@ -180,8 +180,11 @@ class Comparison:
 
 
 def check_all(options: argparse.Namespace, folder: Path, results: list[Result]) -> None:
-    checks, files = list[Check](), [file for name in options.files for file in find_checks(name)]
+    checks, files = list[Check](), list(dict.fromkeys(file for name in options.files for file in find_checks(name)))
+    of_name = {file.stem: file for file in files}  # flights, pages and verdicts have the name of their check
     for file in files:
+        if of_name[file.stem] != file:
+            raise InputError(f"{file}: expected checks of different names, got {of_name[file.stem]}, too")
         try:
             checks.append(load_check(file, options.library))
         except (ConfigError, ImportError) as error:

@@ -238,6 +238,12 @@ def test_a_junit_file_is_written_for_every_mistake(tmp_path, capsys, monkeypatch
     assert ("expected root and the programs ip, nft and tc, got another user" in error) == ("hosts" in words)
 
 
+def test_two_checks_of_one_name_are_refused(tmp_path):
+    (tmp_path / "other").mkdir()
+    files = [make_check(folder, "outcome: finished") for folder in (tmp_path, tmp_path / "other")]
+    assert find_error(tmp_path, *files) == f"{files[0]}: expected checks of different names, got {files[1]}, too"
+
+
 def test_update_writes_the_certificate_and_nothing_else(tmp_path, flown):
     file = make_check(tmp_path, "certificate: unknown, because: known", "value: load_x_m, max: 9")
     before = file.read_text()
