@@ -78,7 +78,7 @@ def test_a_winch_changes_length_and_tension():
     hit = system.impact(REST, vehicles, length_rate_m_s=[-1.0])
     assert hit.impulse_n_s == pytest.approx([reduced * 0.6], rel=1e-14)
     assert not system.impact(REST, vehicles).impulse_n_s.any()
-    with pytest.raises(sls.InputError, match=r"length_rate_m_s: expected 1, got 2"):
+    with pytest.raises(sls.ConfigError, match=r"length_rate_m_s: expected 1, got 2"):
         system.impact(REST, vehicles, length_rate_m_s=[1, 2])
 
 

@@ -5,7 +5,6 @@
 #include <optional>
 #include <stdexcept>
 #include <string>
-#include <utility>
 
 namespace sls::sim::cables {
 namespace {
@@ -46,12 +45,18 @@ double calc_tangents_crossing(double at_0, double slope_0, double at_1, double s
   return at_0 + slope_0 * (at_1 - at_0 - slope_1) / (slope_0 - slope_1);
 }
 
-/// The `cables` that move something: not those between a vehicle and a load that both stand.
-Members find_moving(Members cables, const Members& standing) {
-  if (standing.has(kLoad))
-    for (const std::size_t body : standing)
-      if (body != kLoad) cables.remove(body);
-  return cables;
+/// Whether a cable can move something: not between a vehicle and a load that both stand.
+bool moves(std::size_t cable, const Members& standing) {
+  return standing.empty() || !standing.has(kLoad) || !standing.has(cable);
+}
+
+/// Those of the `cables` that can move something.
+Members find_moving(const Members& cables, const Members& standing) {
+  if (standing.empty()) return cables;
+  Members moving;
+  for (const std::size_t i : cables)
+    if (moves(i, standing)) moving.add(i);
+  return moving;
 }
 
 double get_z(const Motion& motion, std::size_t body) {
@@ -93,31 +98,31 @@ HybridMotion::HybridMotion(const System& system, const Motion& start)
       held_(system),
       uncut_(Members::all(system.count)),
       bodies_(find_bodies(system)) {
-  now_.tension.fill(0.0);
-  now_.ground.fill(0.0);
+  now().tension.fill(0.0);
+  now().ground.fill(0.0);
   stage_.ground.fill(0.0);
-  between_ = now_;
-  now_.motion = start;
+  between_ = now();
+  now().motion = start;
   Members landing;
   for (const std::size_t body : bodies_)
     if (get_z(start, body) >= *system_.ground_z_W - kLengthTolerance &&
         get_fall(start, body) >= 0.0)
       landing.add(body);
-  calc_geometry(system_, now_.motion, uncut_, now_.geometry);
+  calc_geometry(system_, now().motion, uncut_, now().geometry);
   // Ends that move apart at the length meet now; the others of these cables do not.
   mode_.taut = find_moving(
-      find_candidates(uncut_, now_.geometry, kLengthTolerance, kLengthTolerance), landing);
+      find_candidates(uncut_, now().geometry, kLengthTolerance, kLengthTolerance), landing);
   put_on_ground(landing);
-  place(mode_.taut, now_);
+  place(mode_.taut, now());
   const bool meets = std::any_of(mode_.taut.begin(), mode_.taut.end(), [&](std::size_t i) {
-    return now_.geometry.stretch_rate[i] > kLengthTolerance;
+    return now().geometry.stretch_rate[i] > kLengthTolerance;
   });
   if (meets || !landing.empty()) {
     hit(mode_.taut);
-    calc_geometry(held_, now_.motion, uncut_, now_.geometry);
-    mode_.taut = find_touching(now_);
+    calc_geometry(held_, now().motion, uncut_, now().geometry);
+    mode_.taut = find_touching(now());
   }
-  settle(mode_.taut, now_);
+  settle(mode_.taut, now());
 }
 
 bool HybridMotion::holds(const Limit& limit) const {
@@ -143,7 +148,7 @@ void HybridMotion::set_standing(const Members& standing) {
 
 /// The `bodies`, which are at the ground, stand on it.
 void HybridMotion::put_on_ground(const Members& bodies) {
-  Motion& motion = now_.motion;
+  Motion& motion = now().motion;
   for (const std::size_t body : bodies)
     (body == kLoad ? motion.p_WL : motion.vehicles[body].p_W).z() = *system_.ground_z_W;
   set_standing(unite(mode_.standing, bodies));
@@ -152,9 +157,10 @@ void HybridMotion::put_on_ground(const Members& bodies) {
 /// The cables at their length whose ends do not approach.
 Members HybridMotion::find_touching(const Instant& instant) const {
   const double speed = instant.motion.v_WL.lpNorm<1>(), place = instant.motion.p_WL.lpNorm<1>();
-  return find_moving(find_candidates(uncut_, instant.geometry, kTouching * (1.0 + place),
-                                     kTouching * (1.0 + speed)),
-                     mode_.standing);
+  Members touching = find_candidates(uncut_, instant.geometry, kTouching * (1.0 + place),
+                                     kTouching * (1.0 + speed));
+  if (mode_.standing.empty()) return touching;
+  return find_moving(touching, mode_.standing);
 }
 
 /// Forces and accelerations, with the taut cables at their length and the standing bodies still.
@@ -244,32 +250,32 @@ double HybridMotion::calc_lift(const Actions& actions, const Instant& instant,
 /// The `cables` are taut from now on, also if they push.
 void HybridMotion::keep(const Actions& actions, const Members& cables) {
   mode_.taut = cables;
-  hold(cables, now_);
-  pull(actions, now_);
+  hold(cables, now());
+  pull(actions, now());
 }
 
 /// Which of the `candidates` are taut from now on, with the standing bodies still.
 void HybridMotion::solve(const Actions& actions, const Members& candidates) {
   const Accelerations result =
-      calc_accelerations(held_, now_.motion, now_.geometry, actions, candidates);
-  now_.rate = result.rate;
-  now_.tension = result.tension;
+      calc_accelerations(held_, now().motion, now().geometry, actions, candidates);
+  now().rate = result.rate;
+  now().tension = result.tension;
   mode_.taut = result.taut;
-  hold(mode_.taut, now_);
+  hold(mode_.taut, now());
 }
 
 /// Which of the `candidates` are taut, and which bodies still stand, from now on.
 void HybridMotion::choose(const Actions& actions, const Members& candidates) {
   solve(actions, find_moving(candidates, mode_.standing));
   while (!mode_.standing.empty()) {
-    support(actions, now_);
+    support(actions, now());
     const auto* rising =
         std::find_if(mode_.standing.begin(), mode_.standing.end(), [&](std::size_t body) {
-          return calc_lift(actions, now_, body) > kRounding * force_scale_;
+          return calc_lift(actions, now(), body) > kRounding * force_scale_;
         });
     if (rising == mode_.standing.end()) return;
     set_free(*rising);
-    solve(actions, find_moving(unite(candidates, find_touching(now_)), mode_.standing));
+    solve(actions, find_moving(unite(candidates, find_touching(now())), mode_.standing));
   }
 }
 
@@ -277,20 +283,20 @@ void HybridMotion::set_free(std::size_t body) {
   Members others = mode_.standing;
   others.remove(body);
   set_standing(others);
-  calc_geometry(held_, now_.motion, uncut_, now_.geometry);
+  calc_geometry(held_, now().motion, uncut_, now().geometry);
 }
 
 /// An impact: impulses along the cables `meeting`, and of the ground, which stops the standing
 /// bodies unless cables pull them off. Returns the impulses of the cables.
 Vector HybridMotion::hit(const Members& meeting) {
-  const Motion before = now_.motion;
+  const Motion before = now().motion;
   Vector impulses;
   const auto fly_on = [&](const Members& standing) {
     set_standing(standing);
-    now_.motion = before;
-    stop(standing, now_.motion);
+    now().motion = before;
+    stop(standing, now().motion);
     impulses =
-        apply_impact(held_, system_.restitution, find_moving(meeting, standing), now_.motion);
+        apply_impact(held_, system_.restitution, find_moving(meeting, standing), now().motion);
   };
   fly_on(mode_.standing);
   for (Members tried; tried.size() < mode_.standing.size();) {
@@ -304,7 +310,7 @@ Vector HybridMotion::hit(const Members& meeting) {
     double scale = std::abs(down);
     for (const std::size_t i : meeting) {
       if (body != kLoad && body != i) continue;
-      const double along = impulses[i] * now_.geometry.n_W[i].z();
+      const double along = impulses[i] * now().geometry.n_W[i].z();
       down += body == kLoad ? -along : along;
       scale += impulses[i];
     }
@@ -313,7 +319,7 @@ Vector HybridMotion::hit(const Members& meeting) {
     Members others = standing;
     others.remove(body);
     fly_on(others);
-    if (get_fall(now_.motion, body) < 0.0)
+    if (get_fall(now().motion, body) < 0.0)
       tried = {};  // it rises; the other bodies feel other impulses
     else
       fly_on(standing);
@@ -324,46 +330,47 @@ Vector HybridMotion::hit(const Members& meeting) {
 void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
   // The classical method, with the taut cables held.
   Instant& stage = stage_;
-  Motion sum = now_.rate;
+  Motion sum = now().rate;
   const auto calc_stage = [&](double share, const Motion& rate) {
-    add(system_, now_.motion, share * h, rate, stage.motion);
+    add(system_, now().motion, share * h, rate, stage.motion);
     calc_geometry(held_, stage.motion, mode_.taut, stage.geometry);
     hold(mode_.taut, stage);
     pull(actions, stage);
   };
-  calc_stage(0.5, now_.rate);
+  calc_stage(0.5, now().rate);
   add(system_, sum, 2.0, stage.rate, sum);
   calc_stage(0.5, stage.rate);
   add(system_, sum, 2.0, stage.rate, sum);
-  between_ = stage;
+  between_.tension = stage.tension;
+  if (!mode_.standing.empty()) between_.ground = stage.ground;
   calc_stage(1.0, stage.rate);
   add(system_, sum, 1.0, stage.rate, sum);
-  add(system_, now_.motion, h / 6.0, sum, end.motion);
+  add(system_, now().motion, h / 6.0, sum, end.motion);
   settle(mode_.taut, end);
   pull(actions, end);
 }
 
-/// How far the mode of a limit is violated: by a negative tension, a lift (N), or an excess (m).
-double HybridMotion::calc_violation(const Actions& actions, const Instant& instant,
-                                    const Limit& limit) const {
-  if (!holds(limit)) return calc_excess(instant, limit);
+/// How far a limit that holds is lost, N: by a negative tension, or a lift.
+double HybridMotion::calc_loss(const Actions& actions, const Instant& instant,
+                               const Limit& limit) const {
   if (limit.of == Limit::Of::kCable) return -instant.tension[limit.index];
   return calc_lift(actions, instant, limit.index);
 }
 
 /// When a limit that holds is lost within `h`, because its force becomes negative; none if not.
-std::optional<double> HybridMotion::find_loss(const Actions& actions, double h, const Instant& end,
+std::optional<double> HybridMotion::find_loss(const Actions& actions, double h,
+                                              const Holding& middle, const Instant& end,
                                               const Limit& limit) {
   const auto force = [&](const Holding& at) {
     return limit.of == Limit::Of::kCable ? at.tension[limit.index] : at.ground[limit.index];
   };
-  const double start = force(now_), between = force(between_), last = force(end);
+  const double start = force(now()), between = force(middle), last = force(end);
   const double tolerance = kRounding * force_scale_;
   const auto violation = [&](double time) {
     integrate(actions, time, trial_);
-    return calc_violation(actions, trial_, limit);
+    return calc_loss(actions, trial_, limit);
   };
-  double until = h, at_end = calc_violation(actions, end, limit);
+  double until = h, at_end = calc_loss(actions, end, limit);
   if (!(at_end > tolerance)) {
     // A dip: by the parabola through the middle, whose tangents at both ends meet below it.
     const double fall = 4.0 * between - 3.0 * start - last,
@@ -393,7 +400,7 @@ std::optional<double> HybridMotion::find_loss(const Actions& actions, double h, 
     until = at_left > tolerance ? left : right;
     at_end = at_left > tolerance ? at_left : at_right;
   }
-  const double at_start = calc_violation(actions, now_, limit);
+  const double at_start = calc_loss(actions, now(), limit);
   if (at_start > 0.0) return 0.0;
   return find_crossing(violation, 0.0, at_start, until, at_end);
 }
@@ -401,8 +408,8 @@ std::optional<double> HybridMotion::find_loss(const Actions& actions, double h, 
 /// When a limit that does not hold is reached within `h`; none if it is not.
 std::optional<double> HybridMotion::find_arrival(const Actions& actions, double h,
                                                  const Instant& end, const Limit& limit) {
-  const double start = calc_excess(now_, limit), last = calc_excess(end, limit);
-  const double rate = calc_excess_rate(now_, limit), last_rate = calc_excess_rate(end, limit);
+  const double start = calc_excess(now(), limit), last = calc_excess(end, limit);
+  const double rate = calc_excess_rate(now(), limit), last_rate = calc_excess_rate(end, limit);
   const double tolerance = 0.1 * kTouching * (1.0 + end.motion.p_WL.lpNorm<1>());
   const auto violation = [&](double time) {
     integrate(actions, time, trial_);
@@ -434,17 +441,17 @@ std::optional<double> HybridMotion::find_arrival(const Actions& actions, double 
 
 HybridMotion::Found HybridMotion::find_first(const Actions& actions, double h, const Instant& end) {
   Found first;
-  const Holding between = between_;
+  const Holding middle = between_;  // a search overwrites it
   const auto look = [&](const Limit& limit) {
     const bool is_held = holds(limit);
     if (is_held && is_stuck_) return;
-    between_ = between;  // a search overwrites it
     const auto time =
-        is_held ? find_loss(actions, h, end, limit) : find_arrival(actions, h, end, limit);
+        is_held ? find_loss(actions, h, middle, end, limit) : find_arrival(actions, h, end, limit);
     if (time && (first.limit.of == Limit::Of::kNothing || *time < first.time))
       first = {*time, limit};
   };
-  for (const std::size_t i : find_moving(uncut_, mode_.standing)) look({Limit::Of::kCable, i});
+  for (const std::size_t i : uncut_)
+    if (moves(i, mode_.standing)) look({Limit::Of::kCable, i});
   for (const std::size_t body : bodies_) look({Limit::Of::kBody, body});
   return first;
 }
@@ -452,18 +459,18 @@ HybridMotion::Found HybridMotion::find_first(const Actions& actions, double h, c
 /// A cable reaches its length, or a body the ground, with others.
 void HybridMotion::meet(const Actions& actions, double time, const Limit& limit,
                         std::vector<Event>& events) {
-  const Geometry& geometry = now_.geometry;
+  const Geometry& geometry = now().geometry;
   const Mode before = mode_;
   Members meeting = mode_.taut, landing;
   (limit.of == Limit::Of::kCable ? meeting : landing).add(limit.index);
   // Ends that approach so slowly that they would not get away by more than rounding stay.
-  const bool stays = calc_excess_rate(now_, limit) < 0.0;
+  const bool stays = calc_excess_rate(now(), limit) < 0.0;
   if (is_stuck_ || stays) {
     put_on_ground(landing);
-    stop(landing, now_.motion);
+    stop(landing, now().motion);
     meeting = find_moving(meeting, mode_.standing);
-    settle(meeting, now_);
-    calc_geometry(held_, now_.motion, uncut_, now_.geometry);
+    settle(meeting, now());
+    calc_geometry(held_, now().motion, uncut_, now().geometry);
     if (is_stuck_)
       keep(actions, meeting);
     else
@@ -476,18 +483,18 @@ void HybridMotion::meet(const Actions& actions, double time, const Limit& limit,
         geometry.stretch[i] + kSimultaneous * geometry.stretch_rate[i] >= 0.0)
       meeting.add(i);
   for (const std::size_t body : bodies_) {
-    const double below = get_z(now_.motion, body) - *system_.ground_z_W;
-    const double fall = get_fall(now_.motion, body);
+    const double below = get_z(now().motion, body) - *system_.ground_z_W;
+    const double fall = get_fall(now().motion, body);
     if (fall > 0.0 && below + std::max(kTouching, kSimultaneous * fall) >= 0.0) landing.add(body);
   }
   put_on_ground(landing);
-  place(find_moving(meeting, mode_.standing), now_);
+  place(find_moving(meeting, mode_.standing), now());
   const Vector impulses = hit(meeting);
   for (const std::size_t i : meeting)
     if (impulses[i] > 0.0 && !before.taut.has(i))
       events.push_back({Event::Kind::kTaut, i, time, impulses[i]});
-  calc_geometry(held_, now_.motion, uncut_, now_.geometry);
-  choose(actions, find_touching(now_));
+  calc_geometry(held_, now().motion, uncut_, now().geometry);
+  choose(actions, find_touching(now()));
   Mode known = before;
   for (const std::size_t i : meeting)
     if (impulses[i] > 0.0) known.taut.add(i);
@@ -499,7 +506,7 @@ void HybridMotion::let_go(const Actions& actions, double time, const Limit& limi
                           std::vector<Event>& events) {
   const Mode before = mode_;
   if (limit.of == Limit::Of::kBody) set_free(limit.index);
-  const Members candidates = unite(find_touching(now_), mode_.taut);
+  const Members candidates = unite(find_touching(now()), mode_.taut);
   choose(actions, candidates);
   if (limit.of == Limit::Of::kCable && mode_.taut == before.taut) {  // it is rounding of 0
     Members others = before.taut;
@@ -523,14 +530,14 @@ void HybridMotion::report(const Mode& before, double time, std::vector<Event>& e
 }
 
 void HybridMotion::set_length(std::size_t cable, double length, double rate) {
-  now_.motion.vehicles[cable].length = length;
-  now_.motion.vehicles[cable].length_rate = rate;
+  now().motion.vehicles[cable].length = length;
+  now().motion.vehicles[cable].length_rate = rate;
 }
 
 void HybridMotion::cut(std::size_t cable) {
   uncut_.remove(cable);
   mode_.taut.remove(cable);
-  hold(mode_.taut, now_);
+  hold(mode_.taut, now());
 }
 
 void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& events) {
@@ -539,13 +546,14 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
   for (std::size_t i = 0; i < system_.count; ++i)
     force_scale_ += system_.vehicle_mass[i] * system_.gravity + actions.f_Q_W[i].lpNorm<1>();
   // Forces jump between steps: which cables pull now?
-  pull(actions, now_);
-  const auto pushes = [&](std::size_t i) { return now_.tension[i] < -kRounding * force_scale_; };
+  pull(actions, now());
+  const auto pushes = [&](std::size_t i) { return now().tension[i] < -kRounding * force_scale_; };
   const auto lifts = [&](std::size_t body) {
-    return calc_lift(actions, now_, body) > kRounding * force_scale_;
+    return calc_lift(actions, now(), body) > kRounding * force_scale_;
   };
   const Members &taut = mode_.taut, &standing = mode_.standing;
-  const Members candidates = unite(find_touching(now_), taut);
+  Members candidates = find_touching(now());
+  for (const std::size_t i : taut) candidates.add(i);
   if (std::any_of(taut.begin(), taut.end(), pushes) || !(candidates == taut) ||
       std::any_of(standing.begin(), standing.end(), lifts)) {
     const Mode before = mode_;
@@ -555,11 +563,11 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
   double time = 0.0;
   for (int count = 1;; ++count) {
     const double rest = h - time;
-    integrate(actions, rest, then_);
-    const Found found = find_first(actions, rest, then_);
+    integrate(actions, rest, then());
+    const Found found = find_first(actions, rest, then());
     if (found.limit.of == Limit::Of::kNothing) break;
-    integrate(actions, found.time, then_);
-    std::swap(now_, then_);
+    integrate(actions, found.time, then());
+    now_at_ = 1 - now_at_;
     time += found.time;
     if (holds(found.limit))
       let_go(actions, time, found.limit, events);
@@ -571,7 +579,7 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
     }
     if (time >= h) return;
   }
-  std::swap(now_, then_);
+  now_at_ = 1 - now_at_;
   check_held();
 }
 
@@ -579,7 +587,7 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
 void HybridMotion::check_held() const {
   if (!mode_.standing.has(kLoad)) return;
   for (const std::size_t i : uncut_)
-    if (mode_.standing.has(i) && now_.geometry.stretch[i] > kLengthTolerance)
+    if (mode_.standing.has(i) && now().geometry.stretch[i] > kLengthTolerance)
       throw std::runtime_error("cable " + std::to_string(i) +
                                ": its winch pulls at a vehicle and a load that both stand on the "
                                "ground, which holds them");

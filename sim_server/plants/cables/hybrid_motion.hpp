@@ -42,12 +42,12 @@ class HybridMotion {
   void cut(std::size_t cable);
   bool is_cut(std::size_t cable) const { return !uncut_.has(cable); }
 
-  const Motion& motion() const { return now_.motion; }
+  const Motion& motion() const { return now().motion; }
   const Members& taut() const { return mode_.taut; }
   /// Vehicles, and kLoad.
   const Members& standing() const { return mode_.standing; }
   /// Of the last step's actions, N; 0 of a slack cable and before the first step.
-  const Vector& tension() const { return now_.tension; }
+  const Vector& tension() const { return now().tension; }
 
   static constexpr double kLengthTolerance = 1e-9;  ///< m
 
@@ -81,6 +81,10 @@ class HybridMotion {
   };
   struct Found;
 
+  Instant& now() { return ends_[now_at_]; }
+  const Instant& now() const { return ends_[now_at_]; }
+  Instant& then() { return ends_[1 - now_at_]; }  // the end of a step
+
   bool holds(const Limit& limit) const;
   double calc_excess(const Instant& instant, const Limit& limit) const;
   double calc_excess_rate(const Instant& instant, const Limit& limit) const;
@@ -100,9 +104,9 @@ class HybridMotion {
   void choose(const Actions& actions, const Members& candidates);
   Vector hit(const Members& meeting);
   void integrate(const Actions& actions, double h, Instant& end);
-  double calc_violation(const Actions& actions, const Instant& instant, const Limit& limit) const;
-  std::optional<double> find_loss(const Actions& actions, double h, const Instant& end,
-                                  const Limit& limit);
+  double calc_loss(const Actions& actions, const Instant& instant, const Limit& limit) const;
+  std::optional<double> find_loss(const Actions& actions, double h, const Holding& middle,
+                                  const Instant& end, const Limit& limit);
   std::optional<double> find_arrival(const Actions& actions, double h, const Instant& end,
                                      const Limit& limit);
   Found find_first(const Actions& actions, double h, const Instant& end);
@@ -116,7 +120,9 @@ class HybridMotion {
   Members uncut_;         // cables
   const Members bodies_;  // that the ground stops; none without ground
   Mode mode_;
-  Instant now_, then_, trial_, stage_;
+  std::array<Instant, 2> ends_;  // large: exchanged by their place
+  std::size_t now_at_ = 0;
+  Instant trial_, stage_;
   Holding between_;           // in the middle of the step last integrated
   double force_scale_ = 0.0;  // of all forces, N
   bool is_stuck_ = false;

@@ -5,6 +5,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -99,6 +100,13 @@ inline System make_plate(std::size_t count) {
     system.attachment_L[i] = {0.3 * std::cos(at), 0.3 * std::sin(at), -0.01};
   }
   return system;
+}
+
+/// Into the test's report, for docs/results.md.
+inline void note(const char* name, double number) {
+  std::ostringstream text;
+  text << number;
+  testing::Test::RecordProperty(name, text.str());
 }
 
 /// Kinetic and potential energy, J.

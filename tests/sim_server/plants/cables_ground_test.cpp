@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
 #include <stdexcept>
 
@@ -43,6 +43,7 @@ TEST(CablesGroundTest, AFallingBodyStopsOnTheGroundAtTheClosedFormsTime) {
     flight.fly(make_actions(is_load ? kHover : Vector3d(0.0, 0.0, 0.0)), 0.5);
     expect(flight.happened, {{fall, Kind::kTouchDown}}, 1e-9);
     EXPECT_EQ(flight.happened[0].cable, is_load ? kLoad : 0);
+    note(is_load ? "error_of_load_s" : "error_of_vehicle_s", flight.happened[0].time - fall);
     EXPECT_EQ(flight.motion.standing().size(), is_load ? 1u : 2u);
     const Motion& end = flight.motion.motion();
     const Vector3d p = is_load ? end.p_WL : end.vehicles[0].p_W,
@@ -104,6 +105,7 @@ TEST(CablesGroundTest, ALoadLiftsOffInsideAStepWhenTheForcesOfAnOrbitExceedItsWe
   EXPECT_EQ(flight.motion.motion().p_WL, Vector3d(0.0, 0.0, 0.0));
   flight.fly(make_actions(kHover), 0.02);
   expect(flight.happened, {{lift_off, Kind::kLiftOff}}, 1e-9);
+  note("error_s", flight.happened[0].time - lift_off);
   EXPECT_LT(flight.motion.motion().p_WL.z(), 0.0);
 }
 
@@ -193,6 +195,7 @@ TEST(CablesGroundTest, NothingSinksAndNoEnergyAppearsInRandomFlights) {
   std::mt19937 random(6);
   std::uniform_real_distribution<double> any(-1.0, 1.0);
   std::size_t touched = 0, lifted = 0;
+  double most = 0.0;
   for (int run = 0; run < 24; ++run) {
     const auto count = 1 + static_cast<std::size_t>(run % 6);
     oracle::Scene scene = oracle::make_scene(random, count, run % 4 < 2, false);
@@ -230,6 +233,7 @@ TEST(CablesGroundTest, NothingSinksAndNoEnergyAppearsInRandomFlights) {
       ASSERT_LE(after.p_WL.z(), *system.ground_z_W + 1e-11) << run << ' ' << k;
       const double gained = calc_energy(system, after) - calc_energy(system, before) - work;
       ASSERT_LE(gained, 1e-6) << run << ' ' << k;  // truncation, at most 30 rad/s
+      most = std::max(most, gained);
       for (const Event& event : events) {
         touched += event.kind == Kind::kTouchDown;
         lifted += event.kind == Kind::kLiftOff;
@@ -241,6 +245,8 @@ TEST(CablesGroundTest, NothingSinksAndNoEnergyAppearsInRandomFlights) {
   }
   EXPECT_GT(touched, 100u);
   EXPECT_GT(lifted, 100u);
+  note("largest_gain_j", most);
+  note("touch_downs", static_cast<double>(touched));
 }
 
 TEST(CablesGroundTest, VehiclesThatLandTogetherMeetTheGroundInOneImpact) {

@@ -4,8 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <cstdlib>
-#include <sstream>
 
+#include "tests/sim_server/plants/cables_flights.hpp"
 #include "tests/sim_server/plants/cables_oracle.hpp"
 
 namespace sls::sim::cables {
@@ -48,13 +48,6 @@ void for_each_scene(int scenes, bool keeps_length, const Test& test) {
 
 // The second formulation solves systems of condition 1e4; rounding 1e-16 becomes 1e-12.
 constexpr double kRelative = 1e-11;
-
-/// Into the test's report, for docs/results.md.
-void note(const char* name, double number) {
-  std::ostringstream text;
-  text << number;
-  testing::Test::RecordProperty(name, text.str());
-}
 
 TEST(CablesMechanicsTest, AcceleratesAsTheSecondFormulation) {
   int mixed = 0;
