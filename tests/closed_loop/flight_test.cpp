@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <deque>
 
+#include "sim_server/plants/cables/keys.hpp"
 #include "sim_server/plants/slung_load/slung_load_plant.hpp"
 #include "tests/closed_loop/support.hpp"
 
@@ -159,6 +161,34 @@ TEST(FlightTest, FailsWhereTheServerEndsTheRun) {
   const auto [steps, cause] = find_failure(torn);
   EXPECT_EQ(steps, 1u);
   EXPECT_NE(cause.find("is not finite"), std::string::npos) << cause;
+}
+
+TEST(FlightTest, ThreeVehiclesTurnTheirLoadToASuddenAttitudeFromAnyDirectionOfTheirCables) {
+  config::Scenario scenario = load("three_carry_a_triangle_pose");
+  for (auto& cable : scenario.plant.own.edit<sim::CablesKeys>().cables)
+    cable.alpha = cable.beta = 0.0;  // instead of spread
+  config::ConstantReference hold{Vector3d(0.0, 0.0, -1.0)};
+  hold.attitude = Vector3d(0.4, 0.3, 1.0);
+  scenario.mission.resize(1);
+  scenario.mission[0].reference = hold;
+  scenario.mission[0].leave = config::LeaveAfter{12'000'000'000};
+  Flight flight(scenario, {0, 1, 2});
+  while (flight.fly_step())
+    for (const model::StepRecord& step : flight.steps())
+      ASSERT_EQ(step.truth.signals[model::SharedLoad::kTaut], 1.0) << step.step;
+  EXPECT_EQ(flight.failure(), "");
+  const Eigen::Quaterniond wanted = Eigen::AngleAxisd(1.0, Vector3d::UnitZ()) *
+                                    Eigen::AngleAxisd(0.3, Vector3d::UnitY()) *
+                                    Eigen::AngleAxisd(0.4, Vector3d::UnitX());
+  for (const model::StepRecord& step : flight.steps()) {
+    const auto q = step.truth.signals.segment<4>(model::SharedLoad::kAttitude);
+    // The double pole at -3 leaves 1.05 rad · 37 · exp(-36) after 12 s; that at -2 12 mm · 25 ·
+    // exp(-24).
+    EXPECT_LE(wanted.angularDistance({q[0], q[1], q[2], q[3]}), 1e-7);
+    const Vector3d& end =
+        scenario.plant.own.get<sim::CablesKeys>().cables[step.vehicle_id].attachment;
+    EXPECT_LE((step.truth.p_WL - Vector3d(0.0, 0.0, -1.0) - wanted * end).norm(), 1e-7);
+  }
 }
 
 }  // namespace
