@@ -50,7 +50,7 @@ class RecorderProgram : public Program {
   void write();
   bool write_samples();
   void note_newest(const RecordBatch& batch);
-  /// write(2) on a disk that takes less than it is given now and then, and nothing when it is full.
+  /// write(2) on a disk that takes only a part of every fifth write, and nothing when it is full.
   ssize_t write_to_disk(int descriptor, const void* bytes, std::size_t size);
   void on_killed() override { writing_.reset(); }
 
