@@ -184,7 +184,7 @@ TEST(FlightTest, ThreeVehiclesTurnTheirLoadToASuddenAttitudeFromAnyDirectionOfTh
     const auto q = step.truth.signals.segment<4>(model::SharedLoad::kAttitude);
     // The double pole at -3 leaves 1.05 rad · 37 · exp(-36) after 12 s; that at -2 12 mm · 25 ·
     // exp(-24).
-    EXPECT_LE(wanted.angularDistance({q[0], q[1], q[2], q[3]}), 1e-7);
+    EXPECT_LE(wanted.angularDistance(Eigen::Quaterniond(q[0], q[1], q[2], q[3])), 1e-7);
     const Vector3d& end =
         scenario.plant.own.get<sim::CablesKeys>().cables[step.vehicle_id].attachment;
     EXPECT_LE((step.truth.p_WL - Vector3d(0.0, 0.0, -1.0) - wanted * end).norm(), 1e-7);
