@@ -203,7 +203,7 @@ def measure_lockstep(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
 def measure_load(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
     """Over shared memory, while other processes keep the processors busy."""
     figures, comparison = Rounds("load"), Rounds("load")
-    loops = [loop for loop in LOOPS if loop.qos == "default"]
+    loops = [loop for loop in LOOPS if loop.qos == "default" and (loop.is_recorded or not is_quick)]
     for _ in range(rounds):
         speeds: dict[tuple[int, Loop], float] = {}
         for count, loop in itertools.product(QUICK_LOADS if is_quick else LOADS, loops):

@@ -131,7 +131,7 @@ def fly(programs: Programs, scenario: Path, viewers: list[Viewer]) -> Flight:
 def measure_view(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
     """Flights in lockstep, alternately with and without viewers."""
     figures = Rounds("view")
-    scenario = programs.scenario("figure_eight", lasting(16 if is_quick else 240))
+    scenario = programs.scenario("figure_eight", lasting(4 if is_quick else 240))
     for index in range(rounds):
         flights: dict[int, Flight] = {}
         for count in (0, VIEWERS) if index % 2 == 0 else (VIEWERS, 0):

@@ -33,7 +33,10 @@ def remez(target, weight, low, high, count):
             peaks.pop(0 if abs(peaks[0][1]) < abs(peaks[-1][1]) else -1)
         if len(peaks) < count + 1:
             break
-        nodes = [z for z, _ in peaks]
+        exchanged = [z for z, _ in peaks]
+        if exchanged == nodes:  # the same solution again
+            break
+        nodes = exchanged
     rounded = [float(c) for c in coefficients]
     worst = max(abs(w * (mp.polyval([mp.mpf(c) for c in rounded][::-1], z) - f)) for z, f, w in values)
     return rounded, mp.log(worst, 2)

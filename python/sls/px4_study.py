@@ -56,10 +56,6 @@ def see_at_once(scenario: dict[str, Any]) -> None:
     del scenario["sensing"]
 
 
-def estimate_right(scenario: dict[str, Any]) -> None:
-    del scenario["estimator"]
-
-
 def lose_no_thrust(scenario: dict[str, Any]) -> None:
     del scenario["plant"]["rotor"]["thrust_loss_speed_m_s"]
 

@@ -440,8 +440,8 @@ class ProgramTest(FolderTest):
         file = self.folder / "bench.json"
         bench("--quick", "--only", "load", "--json", file)
         names = [figure["name"] for figure in self.check(file, "load") if "ratio" in figure]
-        self.assertEqual(sum("1 busy loop" in name for name in names), 6)
-        self.assertEqual(sum("beside blocking" in name for name in names), 4)
+        self.assertEqual(sum("1 busy loop" in name for name in names), 3)
+        self.assertEqual(sum("beside blocking" in name for name in names), 2)
 
     def test_a_quick_recorder_part_loses_nothing(self):
         file = self.folder / "bench.json"

@@ -40,9 +40,9 @@ TEST_P(ClosedLoopProgramTest, RecordsTheFilesAndTheCertificateOfTheThreePrograms
   EXPECT_EQ(verify.wait(), 0) << verify.output();
 }
 
-// One vehicle; a fleet with stages that end within a radius; faults; another law.
+// A fleet with stages that end within a radius; faults; another law.
 INSTANTIATE_TEST_SUITE_P(Scenarios, ClosedLoopProgramTest,
-                         ::testing::Values("short", "mixed_fleet", "faulty_figure_eight",
+                         ::testing::Values("mixed_fleet", "faulty_figure_eight",
                                            "figure_eight_pid"),
                          [](const auto& flown) { return std::string(flown.param); });
 

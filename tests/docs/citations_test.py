@@ -1,6 +1,7 @@
 """Every citation in comments, scenarios and documents exists: sections of docs/design.md, equations and
 headings of a README. A citation may continue on the next line."""
 
+import functools
 import os
 import pathlib
 import re
@@ -9,7 +10,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 SUFFIXES = {".cpp", ".hpp", ".c", ".h", ".idl", ".py", ".sh", ".yaml", ".xml", ".md", ".def"}
-SKIPPED = ("build", "recordings", ".")  # prefixes of folders that are not part of the project
+SKIPPED = ("build", "node_modules", "recordings", ".")  # prefixes of folders that are not part of the project
 
 # 'design, section 7', 'design 6 ("Commands", "Standby")', 'design section 6, Identity'
 DESIGN = re.compile(
@@ -26,13 +27,16 @@ def flatten(text):
     return re.sub(r"[ \t]*\n[ \t]*(?:///?<?|#|\*)?[ \t]*", " ", text)
 
 
+@functools.cache
 def read_files():
     """(path, flat text) of every file that may have citations."""
+    found = []
     for folder, folders, names in os.walk(ROOT):
         folders[:] = sorted(name for name in folders if not name.startswith(SKIPPED))
         for path in (pathlib.Path(folder, name) for name in sorted(names)):
             if path.suffix in SUFFIXES and path != pathlib.Path(__file__).resolve():
-                yield path, flatten(path.read_text(errors="replace"))
+                found.append((path, flatten(path.read_text(errors="replace"))))
+    return found
 
 
 def split_sections(design):

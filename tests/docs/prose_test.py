@@ -27,13 +27,18 @@ def git(*arguments):
         return None
 
 
+def find_part(phrase):
+    """The longest text outside groups, which each match contains: it is found faster than an expression."""
+    return max(re.findall(r"[a-z']+", re.sub(r"\((?:[^()]|\([^()]*\))*\)|\\.|\w\?", "|", phrase)) + [""], key=len)
+
+
 def load_phrases(text):
-    """(expression, replacement) of each line of the list."""
+    """(expression, replacement, part) of each line of the list."""
     for line in text.splitlines():
         if line and not line.startswith("#"):
-            phrase, replacement = line.split("->")
-            phrase = rf"(?<![\w.'])(?:{phrase})(?![\w'])".replace(" ", GAP)
-            yield re.compile(phrase, re.IGNORECASE), replacement
+            words, replacement = line.split("->")
+            phrase = rf"(?<![\w.'])(?:{words})(?![\w'])".replace(" ", GAP)
+            yield re.compile(phrase, re.IGNORECASE), replacement, find_part(words)
 
 
 PHRASES = list(load_phrases((FOLDER / "words_to_avoid.txt").read_text()))
@@ -41,8 +46,9 @@ PHRASES = list(load_phrases((FOLDER / "words_to_avoid.txt").read_text()))
 
 def find_phrases(text):
     """(offset, found text, replacement) of each phrase to avoid."""
-    for phrase, replacement in PHRASES:
-        for found in phrase.finditer(text):
+    lower = text.lower()
+    for phrase, replacement, part in PHRASES:
+        for found in phrase.finditer(text) if part in lower else ():
             yield found.start(), " ".join(found[0].split()), replacement
 
 

@@ -183,10 +183,16 @@ INSTANTIATE_TEST_SUITE_P(
               "sls/command of CLIENT: sls::Commands: expected more bytes, got "}}}),
     [](const auto& mistakes) { return std::string(mistakes.param.name); });
 
-TEST_F(ForeignTest, NoReaderOfStates) {
+TEST_F(ForeignTest, NoReaderOfStatesAndAnswersWithoutTheStageThatWasReturned) {
   start();
-  const auto client = start_foreign({"--mistake", "no_state_reader"});
+  auto client = start_foreign({"--mistake", "no_state_reader"});
   expect_server_line(kWho + "expected a reader of sls/state, got none");
+  client->send(SIGTERM);
+  EXPECT_EQ(client->wait(), 0) << client->output();
+  client = start_foreign({"--mistake", "memory_lost"});
+  expect_server_line(kWho +
+                     "sls/command controller.stage_index at step 250: expected at least 1, as in "
+                     "the state, got 0");
 }
 
 /// It says that the run has failed. Server and client name it and fly on.
@@ -231,14 +237,6 @@ TEST_F(ForeignTest, AppendableTypesOfCyclone) {
                       "asked XCDR2 (compile the types as @final)"});
   EXPECT_EQ(count_mistakes(server->output()), 1);
   expect_line("recorder", *recorder, {"sls/participant" + written});
-}
-
-TEST_F(ForeignTest, WithoutTheStageThatWasReturned) {
-  start();
-  const auto client = start_foreign({"--mistake", "memory_lost"});
-  expect_server_line(kWho +
-                     "sls/command controller.stage_index at step 250: expected at least 1, as in "
-                     "the state, got 0");
 }
 
 // --- no mistake ----------------------------------------------------------------------------------

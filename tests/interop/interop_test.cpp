@@ -338,39 +338,26 @@ TEST_F(InteropTest, ACycloneControllerOnAnotherHostFliesWithProfileUnicast) {
 
 // --- examples/my_client --------------------------------------------------------------------------
 
-/// The template, built outside the source tree as by a user.
+/// The template, built outside the source tree as by a user (CMakeLists.txt).
 class MyClientTest : public InteropTest {
  protected:
-  void SetUp() override {
-    InteropTest::SetUp();
-    if (IsSkipped()) return;
-    std::filesystem::copy(SLS_SOURCE_DIR "/examples/my_client", folder_ / "my_client");
-    Process build({"sh", "-c",
-                   "cd " + (folder_ / "my_client").string() +
-                       " && " SLS_CMAKE " -B build -DSLS_IDL=" SLS_SOURCE_DIR
-                       "/idl/sls.idl -DCMAKE_C_FLAGS=-Werror && " SLS_CMAKE " --build build"});
-    ASSERT_EQ(build.wait(), 0) << build.output();
-  }
   std::unique_ptr<Process> start_server(const Words& before = {}, const Words& further = {}) const {
-    return start("sim_server", Words{"--scenario", folder_ / "my_client/my_client.yaml"} + further,
+    return start("sim_server",
+                 Words{"--scenario", SLS_INTEROP_DIR "/my_client/my_client.yaml"} + further,
                  before);
   }
   std::unique_ptr<Process> start_client(const Words& before = {}) const {
     return std::make_unique<Process>(
-        kOnLoopback + before +
-        Words{(folder_ / "my_client/build/my_client").string(), domain_.text()});
+        kOnLoopback + before + Words{SLS_INTEROP_DIR "/my_client/build/my_client", domain_.text()});
   }
 
   static constexpr std::size_t kLastStep = 5000;
 };
 
-TEST_F(MyClientTest, HasNoMoreThan240Lines) {
-  EXPECT_LE(count_rows(folder_ / "my_client/my_client.c"), 240u);
-}
-
 /// Its memory, an integral, is part of states and answers: losses and a killed client change no
 /// byte.
 TEST_F(MyClientTest, BringsTheLoadToItsPointWithTheSameBytesDespiteLosses) {
+  EXPECT_LE(count_rows(SLS_INTEROP_DIR "/my_client/my_client.c"), 240u) << "a template is short";
   const std::string undisturbed = recording_ + "-undisturbed";
   for (const bool is_disturbed : {false, true}) {
     const Words loss = is_disturbed ? lossy(5) : Words{};

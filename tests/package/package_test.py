@@ -115,9 +115,10 @@ def make_system(package):
     if not (SYSTEM / "made").is_file():
         tree.remove(SYSTEM)
         mirror = tree.find_mirror()
+        # The system need not survive a power cut: dpkg writes it without waiting for the disk.
         made = subprocess.run(["unshare", "--mount", "--propagation", "private", "mmdebstrap", "--variant=minbase",
-                               tree.CODENAMES[NAME], SYSTEM, mirror], capture_output=True, text=True, timeout=1200,
-                              check=False)
+                               "--dpkgopt=force-unsafe-io", tree.CODENAMES[NAME], SYSTEM, mirror], capture_output=True,
+                              text=True, timeout=1200, check=False)
         if made.returncode != 0:
             skip(f"mmdebstrap from {mirror} failed: {made.stderr.strip().splitlines()[-1:]}")
         (SYSTEM / "made").touch()
@@ -216,24 +217,7 @@ class PackageTest(unittest.TestCase):
             self.assertEqual(fly("sls", name, expected=2),
                              f"sls: error: {name}: needs the source tree; this sls is installed without it\n")
 
-    @unittest.skipIf(NAME != OWN, "skipped: this machine has the compilers of another system")
-    def test_4_an_example_is_built_against_the_package_and_flown(self):
-        unpacked, example = FOLDER / "unpacked", FOLDER / "my_controller"
-        for folder in (unpacked, example):
-            tree.remove(folder)
-        run(["dpkg-deb", "--extract", self.package, unpacked])
-        shutil.copytree(unpacked / "usr/share/doc/sls/examples/my_controller", example)
-        run(["cmake", "-S", example, "-B", example / "build", f"-DCMAKE_PREFIX_PATH={unpacked}/usr",
-             "-DCMAKE_C_FLAGS=-Werror"])
-        self.assertIn(f"{unpacked}/usr/", (example / "build/CMakeCache.txt").read_text())
-        run(["cmake", "--build", example / "build"])
-        place = Path(f"{SYSTEM}{WORK}/my_controller")
-        (place / "build").mkdir(parents=True)
-        shutil.copy(example / "build/my_controller.so", place / "build")
-        shutil.copy(example / "my_controller.yaml", place)
-        fly("sls", "run", "my_controller/my_controller.yaml", "--in-process", "--out", "own")
-
-    def test_5_the_job_of_the_ci_example_runs_from_nothing(self):
+    def test_4_the_job_of_the_ci_example_runs_from_nothing(self):
         # In a copy of the system that disappears, with the network of this machine, because apt needs the mirror.
         try:
             run_apt("apt-get", "update", "--error-on=any")
@@ -258,7 +242,7 @@ $1" """
                     script, "sh", lines], env=environment, limit_s=1200)
         self.assertIn("100% tests passed", said)
 
-    def test_6_it_is_removed_without_a_trace(self):
+    def test_5_it_is_removed_without_a_trace(self):
         # Python run by root leaves compiled files, which the removal must delete, too.
         run(isolate("python3", "-c", "import sls; sls.lqr", system=SYSTEM))
         run(isolate("apt-get", "purge", "-y", "sls", system=SYSTEM))

@@ -367,18 +367,13 @@ class SceneTest(support.FolderTest):
         self.assertIn(f"{NO_SCENE}expected at most", output)
 
     @unittest.skipUnless(VIEWER.exists() and FLYER.exists(), "skipped: no sls_view in this build")
-    def test_the_scene_is_in_the_report_the_same_recording_gives_the_same_bytes_and_a_browser_renders_it(self):
+    def test_the_scene_is_in_the_report_and_the_same_recording_gives_the_same_bytes(self):
         page, output = self.make_report(self.fly("short"), VIEWER)
         self.assertEqual(output, "sls: report: short/report.html\n")
         first = page.read_bytes()
         self.assertEqual(first.count(b"<iframe"), 1)
         self.make_report("short", VIEWER)
         self.assertEqual(page.read_bytes(), first)
-        if browser.PROGRAM:
-            document, console = browser.render(page)
-            self.assertEqual(console, [])
-            for finding in ("broken", "overflow", "requests"):
-                self.assertIn(f'data-{finding}="0"', document)
 
     @unittest.skipUnless(VIEWER.exists() and FLYER.exists(), "skipped: no sls_view in this build")
     def test_long_flights_and_fleets_stay_within_4_mb(self):

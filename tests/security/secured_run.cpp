@@ -10,9 +10,9 @@ std::vector<std::string> put_before(std::vector<std::string> before,
   return before;
 }
 
-SecuredRun::SecuredRun(int seconds) {
-  write_bytes(scenario_file(), replace_once(read_bytes(scenario("short")), "for_s: 2",
-                                            "for_s: " + std::to_string(seconds)));
+SecuredRun::SecuredRun() {
+  write_bytes(scenario_file(),
+              replace_once(read_bytes(scenario("short")), "timeout_s: 30", "timeout_s: 120"));
 }
 
 std::unique_ptr<Process> SecuredRun::start(const std::string& name,

@@ -16,8 +16,8 @@ std::vector<std::string> put_before(std::vector<std::string> before,
 
 class SecuredRun {
  public:
-  /// A figure eight of `seconds` s of simulation, with 250 steps per second.
-  explicit SecuredRun(int seconds = 2);
+  /// A figure eight of 500 steps. The server waits 120 s for the others.
+  SecuredRun();
 
   std::unique_ptr<Process> start_server() const;
   std::unique_ptr<Process> start_recorder() const;

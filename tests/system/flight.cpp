@@ -35,6 +35,13 @@ std::vector<std::string> make_command(const std::string& name, int domain,
   return command;
 }
 
+std::string make_long_scenario(const TemporaryFolder& folder,
+                               std::vector<std::pair<std::string, std::string>> changes) {
+  changes.emplace_back("period_s: 0.004", "period_s: 0.002");
+  changes.emplace_back("mission:", "record: { flush_s: 0.02 }\nmission:");
+  return make_scenario(folder, changes, "figure_eight");
+}
+
 Flight::Flight(const std::string& scenario_file, const FlightOptions& options)
     : recording_(folder / "recording") {
   std::vector<std::string> server_flags = {"--scenario", scenario_file};

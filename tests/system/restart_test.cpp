@@ -9,18 +9,16 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::string> kScenario = {"--scenario", scenario("figure_eight")};
-
 class RestartTest : public ::testing::Test {
  protected:
   std::unique_ptr<Process> start(const char* name, const std::vector<std::string>& flags) const {
     return std::make_unique<Process>(make_command(name, domain_.number(), flags));
   }
   std::unique_ptr<Process> start_server() const {
-    return start("sim_server", kScenario + kManySteps);
+    return start("sim_server", {"--scenario", file_});
   }
   std::unique_ptr<Process> start_client(const std::vector<std::string>& further = {}) const {
-    return start("control_client", kScenario + further);
+    return start("control_client", std::vector<std::string>{"--scenario", file_} + further);
   }
   std::unique_ptr<Process> start_recorder(const std::vector<std::string>& further = {}) const {
     return start("recorder", std::vector<std::string>{"--out", recording()} + further);
@@ -31,31 +29,19 @@ class RestartTest : public ::testing::Test {
     return wait_until([&] { return read_file(recording() + "/command.csv").size() > 20'000; });
   }
 
-  static void expect_undisturbed(const fs::path& recording) {
-    test::expect_undisturbed(recording, scenario("figure_eight"), kManySteps);
-  }
-
   TemporaryFolder folder_;
   OwnDomain domain_;
+  std::string file_ = make_long_scenario(folder_);
 };
 
-TEST_F(RestartTest, AKilledClientIsReplacedByOneThatServesAtOnce) {
-  const auto recorder = start_recorder(), server = start_server();
+TEST_F(RestartTest, AKilledClientAndAKilledRecorderGoOnAndTogetherNothingIsMissing) {
+  auto recorder = start_recorder({"--resume"});
+  const auto server = start_server();
   auto client = start_client();
   ASSERT_TRUE(wait_for_rows()) << server->output();
   client->kill();
-  client = start_client();
-  EXPECT_EQ(server->wait(), 0) << server->output();
-  EXPECT_EQ(client->wait(), 0) << client->output();
-  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
-  expect_undisturbed(recording());
-}
-
-TEST_F(RestartTest, AKilledRecorderGoesOnInANewSegmentAndTogetherNothingIsMissing) {
-  auto recorder = start_recorder({"--resume"});
-  const auto server = start_server(), client = start_client();
-  ASSERT_TRUE(wait_for_rows()) << server->output();
   recorder->kill();
+  client = start_client();
   recorder = start_recorder({"--resume"});
   EXPECT_EQ(server->wait(), 0) << server->output();
   EXPECT_EQ(client->wait(), 0) << client->output();
@@ -65,7 +51,7 @@ TEST_F(RestartTest, AKilledRecorderGoesOnInANewSegmentAndTogetherNothingIsMissin
   EXPECT_TRUE(manifest.at("complete").get<bool>()) << manifest;
   EXPECT_EQ(manifest.at("segment").at("number"), 2);
   EXPECT_GT(manifest.at("segment").at("first_step").get<int>(), 0);
-  expect_undisturbed(recording());
+  expect_undisturbed(recording(), file_);
 }
 
 TEST_F(RestartTest, AKilledServerIsReplacedAndProgramsWithFollowFlyTheNewRun) {
@@ -87,11 +73,12 @@ TEST_F(RestartTest, AKilledServerIsReplacedAndProgramsWithFollowFlyTheNewRun) {
     if (entry.is_directory()) second = entry.path();
   ASSERT_EQ(second.filename().string().rfind("run-", 0), 0u) << second;
   EXPECT_NE(read_manifest(second).at("run_id"), first.at("run_id"));
-  expect_undisturbed(second);
+  expect_undisturbed(second, file_);
 }
 
 /// A killed process cannot remove its shared memory. The next process must still start.
 TEST_F(RestartTest, StaleSharedMemoryStopsNoStart) {
+  file_ = scenario("short");
   std::vector<fs::path> left;
   for (int i = 0; i < 3; ++i) {
     const auto server = start_server();
@@ -103,8 +90,7 @@ TEST_F(RestartTest, StaleSharedMemoryStopsNoStart) {
     EXPECT_EQ(server->wait(), 137);
   }
   for (const auto& file : left) EXPECT_TRUE(fs::exists(file)) << file;
-  const auto recorder = start_recorder(), server = start_server();
-  const auto client = start_client();
+  const auto recorder = start_recorder(), server = start_server(), client = start_client();
   EXPECT_EQ(server->wait(), 0) << server->output();
   EXPECT_EQ(client->wait(), 0) << client->output();
   EXPECT_EQ(recorder->wait(), 0) << recorder->output();

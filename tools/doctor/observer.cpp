@@ -206,7 +206,6 @@ struct Observer::Impl : bus::ParticipantListener {
     program.id = id;
     program.name = news.name;
     program.user = find_property(news, dds::parameter_policy_physical_data_user);
-    program.is_discovery_server = find_property(news, "PARTICIPANT_TYPE") == "SERVER";
     program.is_on_this_host = news.guid.is_on_same_host_as(source->guid());
     program.is_secured = news.identity.has_value();
     program.udp_ports.clear();

@@ -30,7 +30,6 @@ struct Program {
   bool is_on_this_host = false;
   bool is_secured = false;
   bool is_rejected = false;  ///< by DDS Security
-  bool is_discovery_server = false;
   int samples = 0;           ///< received from it
   bool is_expected = false;  ///< one of its latched writers matches our reader
   /// Smallest difference between the times of receiving (our clock) and writing (its clock) a

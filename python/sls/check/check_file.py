@@ -95,7 +95,6 @@ class Participant:
 class Check:
     file: Path
     name: str
-    scenario_place: Place
     scenario_file: Path
     scenario: "Scenario"
     expectations: tuple[Expectation, ...]
@@ -145,7 +144,7 @@ def load_check(file: Path, library: Path | None = None) -> Check:
         controller = Participant(root, "library", (str(library.resolve()),), file.parent.resolve())
     if controller and controller.kind == "library":
         scenario = put_library(controller, scenario, scenario_file)
-    check = Check(file, file.stem, place, scenario_file, scenario, (), controller)
+    check = Check(file, file.stem, scenario_file, scenario, (), controller)
     items = root.require(values, "expect", "a list of expectations")
     if not items.is_list or not items.node.value:
         items.fail_expected("a list of expectations")

@@ -17,10 +17,13 @@ NUMBERS = 300  # arguments of each test
 BITS = 400  # of the numbers that are rounded on the way, because fractions grow with every product
 
 
-def shorten(number):
-    """`number` with BITS leading bits."""
-    shift = BITS - (number.numerator.bit_length() - number.denominator.bit_length())
-    return Fraction(round(number * Fraction(2) ** shift), 1) / Fraction(2) ** shift
+def shorten(number, divisor=1):
+    """`number / divisor` with BITS leading bits."""
+    above, below = number.numerator, number.denominator * divisor
+    shift = BITS - (above.bit_length() - below.bit_length())
+    if shift < 0:
+        return Fraction(above // (below << -shift) << -shift)
+    return Fraction((above << shift) // below, 1 << shift)
 
 
 def sum_terms(make_terms):
@@ -29,12 +32,11 @@ def sum_terms(make_terms):
 
 def powers(x, step, first):
     """x^first / first!, x^(first + step) / (first + step)!, …"""
-    term, n = Fraction(x) ** first / math.factorial(first), first
+    term, factor, n = Fraction(x) ** first / math.factorial(first), Fraction(x) ** step, first
     while True:
         yield term
-        for n in range(n + 1, n + 1 + step):
-            term = term * x / n
-        term = shorten(term)
+        term = shorten(term * factor, math.prod(range(n + 1, n + 1 + step)))
+        n += step
 
 
 def calc_exp(x):
@@ -47,8 +49,8 @@ def calc_exp(x):
 
 
 def calc_sin(x, first=1):
-    """By the power series alone: 100 terms are enough up to |x| = 20. `first` = 0: the cosine."""
-    terms = [term for term, _ in zip(powers(x, 2, first), range(100))]
+    """By the power series alone: its terms fall from the (|x| / 2)th on. `first` = 0: the cosine."""
+    terms = [term for term, _ in zip(powers(x, 2, first), range(30 + 3 * int(abs(x))))]
     return sum(terms[::2]) - sum(terms[1::2])
 
 

@@ -30,7 +30,6 @@ using Phase = ServerCore::Phase;
 class ServerRig : public Outputs, public Surroundings {
  public:
   static constexpr std::uint64_t kRunId = 500;
-  static constexpr std::int64_t kPeriod_ms = 4;
 
   /// One vehicle in lockstep that awaits one controller and no recorder; its mission lasts 1 s.
   static config::Scenario make_scenario() {

@@ -28,8 +28,6 @@ class PageFrames {
 
   /// Adds a sample of sls/record; it is not decoded yet.
   void add(const Sample& sample) { samples_.push_back(sample); }
-  /// Discards the samples added since the last frame.
-  void clear_samples() { samples_.clear(); }
 
   /// Decodes samples added since the last frame: the newest, until each vehicle is among them, then
   /// others up to kMostRowBatches in total. False if no state came.

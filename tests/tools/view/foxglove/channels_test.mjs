@@ -12,9 +12,9 @@ async function start(t, args) {
   return { publisher, view };
 }
 
-for (const protocol of ["foxglove.websocket.v1", "foxglove.sdk.v1"])
-  test(`every channel decodes to what was published, by ${protocol}`, async (t) => {
-    const { view } = await start(t);
+test("every channel decodes to what was published, by either protocol", async (t) => {
+  const { view } = await start(t);
+  for (const protocol of ["foxglove.websocket.v1", "foxglove.sdk.v1"]) {
     const client = new Client(t, view.url, protocol);
     await client.channel("/sls/vehicle_7/markers");
     assert.equal(client.ws.protocol, protocol);
@@ -29,7 +29,8 @@ for (const protocol of ["foxglove.websocket.v1", "foxglove.sdk.v1"])
     judgeLoop(decoded);
     judgeLatched(decoded);
     judgeMirrors(decoded);
-  });
+  }
+});
 
 function judgeLoop(decoded) {
   const state = decoded.get("sls/state");

@@ -254,6 +254,10 @@ test("the report shows the scene, needs nothing else and has at most 4 MB", asyn
   const state = await stateOf(frame);
   assert.equal(state.has_scene, true);
   assert.equal(state.is_playing, false, "a report does not move by itself");
+  assert.deepEqual(await page.evaluate(() => {
+    const { scrollWidth, clientWidth } = document.documentElement;
+    return { broken: [...document.images].filter((image) => !image.naturalWidth).length, overflow: scrollWidth - clientWidth };
+  }), { broken: 0, overflow: 0 });
   await frame.evaluate("window.slsView.seek(5)");
   const row = readColumns(join(recording, "state.csv"))[1250];
   const pose = await frame.evaluate("window.slsView.pose(0)");

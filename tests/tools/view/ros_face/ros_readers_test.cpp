@@ -337,7 +337,7 @@ TEST_F(RosReadersTest, EndpointsAreAnnouncedAsThoseOfRos2AndNoneReadsRos) {
 }
 
 TEST_F(RosReadersTest, AFastFlightIsThinnedToAHundredMessagesASecond) {
-  const std::string file = make_scenario(folder_, {{"for_s: 2", "for_s: 200"}});
+  const std::string file = make_scenario(folder_, {{"for_s: 2", "for_s: 60"}});
   start_watching({"0"});
   const auto begin = std::chrono::steady_clock::now();
   start_flight(file, {});
