@@ -173,6 +173,13 @@ TEST(FlightTest, ThreeVehiclesTurnTheirLoadToASuddenAttitudeFromAnyDirectionOfTh
   scenario.mission[0].reference = hold;
   scenario.mission[0].leave = config::LeaveAfter{12'000'000'000};
   Flight flight(scenario, {0, 1, 2});
+  const std::vector<sim::Signal> signals = flight.plant().signals();
+  for (const auto& [place, name] : {std::pair{model::SharedLoad::kTension, "cable_tension_n"},
+                                    std::pair{model::SharedLoad::kLength, "cable_length_m"},
+                                    std::pair{model::SharedLoad::kTaut, "cable_taut"},
+                                    std::pair{model::SharedLoad::kAttitude, "load_att_w"},
+                                    std::pair{model::SharedLoad::kRates, "load_rate_x_rad_s"}})
+    EXPECT_EQ(signals.at(place).name, name);
   while (flight.fly_step())
     for (const model::StepRecord& step : flight.steps())
       ASSERT_EQ(step.truth.signals[model::SharedLoad::kTaut], 1.0) << step.step;
