@@ -173,6 +173,13 @@ TEST(FlightTest, ThreeVehiclesTurnTheirLoadToASuddenAttitudeFromAnyDirectionOfTh
   scenario.mission[0].reference = hold;
   scenario.mission[0].leave = config::LeaveAfter{12'000'000'000};
   Flight flight(scenario, {0, 1, 2});
+  const std::vector<sim::Signal> signals = flight.plant().signals();
+  for (const auto& [place, name] : {std::pair{model::SharedLoad::kTension, "cable_tension_n"},
+                                    std::pair{model::SharedLoad::kLength, "cable_length_m"},
+                                    std::pair{model::SharedLoad::kTaut, "cable_taut"},
+                                    std::pair{model::SharedLoad::kAttitude, "load_att_w"},
+                                    std::pair{model::SharedLoad::kRates, "load_rate_x_rad_s"}})
+    EXPECT_EQ(signals.at(place).name, name);
   while (flight.fly_step())
     for (const model::StepRecord& step : flight.steps())
       ASSERT_EQ(step.truth.signals[model::SharedLoad::kTaut], 1.0) << step.step;
@@ -184,7 +191,7 @@ TEST(FlightTest, ThreeVehiclesTurnTheirLoadToASuddenAttitudeFromAnyDirectionOfTh
     const auto q = step.truth.signals.segment<4>(model::SharedLoad::kAttitude);
     // The double pole at -3 leaves 1.05 rad · 37 · exp(-36) after 12 s; that at -2 12 mm · 25 ·
     // exp(-24).
-    EXPECT_LE(wanted.angularDistance({q[0], q[1], q[2], q[3]}), 1e-7);
+    EXPECT_LE(wanted.angularDistance(Eigen::Quaterniond(q[0], q[1], q[2], q[3])), 1e-7);
     const Vector3d& end =
         scenario.plant.own.get<sim::CablesKeys>().cables[step.vehicle_id].attachment;
     EXPECT_LE((step.truth.p_WL - Vector3d(0.0, 0.0, -1.0) - wanted * end).norm(), 1e-7);

@@ -1,4 +1,4 @@
-"""The shipped checks hold: all in one process, and those by three programs that no other test flies so."""
+"""The shipped checks hold: all where they say, and those by three programs that no other test flies so."""
 
 from sls.check.cli import main
 from sls.scenario import ROOT
@@ -7,7 +7,7 @@ BY_THREE_PROGRAMS = ["fleet", "mission", "multirotor_geometric", "multirotor_set
                      "rigid_figure_eight", "rotor_drag"]
 
 
-def test_every_shipped_check_holds_in_process(capsys):
+def test_every_shipped_check_holds(capsys):
     assert main([str(ROOT / "config/checks"), "--jobs", "2"]) == 0, capsys.readouterr()
     count = len(list((ROOT / "config/scenarios").glob("*.yaml")))
     assert f"{count} flights: {count} held" in capsys.readouterr().out
