@@ -51,9 +51,9 @@ class FlightTest(support.FolderTest):
     def test_the_short_flight_is_plotted_and_reported(self):
         domain = self.enterContext(support.OwnDomain())
         self.run_launcher("run", "short", "--out", "r", "--domain", domain)
-        self.assertIn("figures: r/figures", self.run_launcher("plot", "r"))
+        self.assertIn("figures: r/figures", self.run_launcher("plot", "r", "--panels", "path", "errors"))
         self.assertIn("report: r/report.html", self.run_launcher("report", "r"))
-        self.assertEqual(len(list((self.folder / "r/figures").iterdir())), 12)
+        self.assertEqual(len(list((self.folder / "r/figures").iterdir())), 4)
         page = (self.folder / "r/report.html").read_text()
         self.assertIn("finished: mission finished", page)
 

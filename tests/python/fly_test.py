@@ -121,7 +121,7 @@ def test_many_flights_need_no_more_memory_than_one():
     for _ in range(20):
         sls.fly(scenario)
     before = read_pages()
-    for _ in range(200):
+    for _ in range(60):
         sls.fly(scenario).certificate
     assert (read_pages() - before) * 4096 < 2 << 20  # one flight has 0.18 MB
 
@@ -216,7 +216,7 @@ def load_long(seconds):
 
 
 def test_other_threads_run_while_a_flight_is_flown():
-    scenario, ticks, is_over = load_long(400), [], threading.Event()
+    scenario, ticks, is_over = load_long(100), [], threading.Event()
 
     def tick():
         while not is_over.is_set():
