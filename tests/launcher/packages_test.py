@@ -31,7 +31,7 @@ DOCKER = {"docker.io", "docker-cli", "docker-compose"}  # installed by hand: doc
 
 
 # Words of prose and of code that are also names of programs.
-NO_PROGRAMS = {"dask", "less", "look", "tape", "time", "view", "write", "zstd"}
+NO_PROGRAMS = {"GET", "HEAD", "POST", "dask", "less", "look", "tape", "time", "view", "write", "zstd"}
 WORD = r"[a-zA-Z][\w.+-]*"
 # Words where a shell expects a command.
 SHELL_COMMAND = re.compile(rf"(?:^|[;|&({{!`'\"]|\b(?:then|do|else|exec|if|while|-v|env|--)) *({WORD})(?=[\s;)'\"]|$)",
