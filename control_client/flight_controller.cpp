@@ -89,15 +89,15 @@ LawOutput FlightController::Parts::calc_law(const LawInput& input) const {
 void FlightController::Parts::fly(std::uint64_t step, const model::Measurement& state,
                                   const model::Numbers& memory, const MissionProgress& progress,
                                   model::Answer& answer) const {
+  const double stage_time = static_cast<double>(step - progress.stage_start_step) * period;
   LawInput input{state,
                  progress.reference,
                  memory,
                  step,
                  progress.stage,
-                 0.0,
+                 stage_time,
                  progress.load_reference,
                  progress.load_attitude};
-  input.stage_time = static_cast<double>(step - progress.stage_start_step) * period;
   input.state.rod = calc_wired_angles(state.rod, controller.state_wiring, plant_rod_length);
   if (memory.size() == 0) input.memory.setZero(law->memory_size());  // step 0
 

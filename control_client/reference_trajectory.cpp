@@ -31,10 +31,7 @@ std::unique_ptr<const ReferenceTrajectory> make(const config::RestToRestReferenc
 
 Eigen::Quaterniond to_quaternion(const config::StageAttitude& attitude,
                                  const Eigen::Quaterniond& otherwise) {
-  if (!attitude) return otherwise;
-  return model::make_turn(attitude->z(), Eigen::Vector3d::UnitZ()) *
-         model::make_turn(attitude->y(), Eigen::Vector3d::UnitY()) *
-         model::make_turn(attitude->x(), Eigen::Vector3d::UnitX());
+  return attitude ? model::make_attitude(attitude->x(), attitude->y(), attitude->z()) : otherwise;
 }
 
 }  // namespace

@@ -39,11 +39,7 @@ Measurement add(const Measurement& state, const StateOffset& offset, double rod_
 }
 
 Eigen::Quaterniond turn(const Eigen::Quaterniond& q_WB, const AttitudeError& error) {
-  using Eigen::Vector3d;
-  const Eigen::Quaterniond seen_from_true = make_turn(error.yaw, Vector3d::UnitZ()) *
-                                            make_turn(error.tilt.y(), Vector3d::UnitY()) *
-                                            make_turn(error.tilt.x(), Vector3d::UnitX());
-  return seen_from_true * q_WB;  // Eq. (9)
+  return make_attitude(error.tilt.x(), error.tilt.y(), error.yaw) * q_WB;  // Eq. (9)
 }
 
 }  // namespace sls::model

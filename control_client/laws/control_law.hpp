@@ -61,6 +61,14 @@ struct LawOutput {
   ErrorCode error_code = ErrorCode::kNone;
 };
 
+/// The output of a law that gives no force, because of `error_code`.
+template <class Output>
+Output without_force(Output output, ErrorCode error_code) {
+  output.f_Q_W.setZero();
+  output.error_code = error_code;
+  return output;
+}
+
 /// A law has no state that changes: its memory travels in `memory`, so any client can answer any
 /// sample.
 class ControlLaw {

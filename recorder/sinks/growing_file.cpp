@@ -26,19 +26,19 @@ GrowingFile::GrowingFile(const std::filesystem::path& path, WriteCall write)
 
 GrowingFile::~GrowingFile() { ::close(descriptor_); }
 
-std::size_t GrowingFile::try_append(std::string_view bytes) {
+std::size_t GrowingFile::try_append(std::string_view bytes, int& error) {
   std::size_t written = 0;
-  while (written < bytes.size()) {
+  while (written < bytes.size() && error == 0) {
     const ssize_t count = write_(descriptor_, bytes.data() + written, bytes.size() - written);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) break;
-    written += static_cast<std::size_t>(count);
+    if (count >= 0)
+      written += static_cast<std::size_t>(count);
+    else if (errno != EINTR)
+      error = errno;
   }
   return written;
 }
 
-void GrowingFile::fail(std::size_t surplus) {
-  const int error = errno;
+void GrowingFile::fail(int error, std::size_t surplus) {
   const off_t end = ::lseek(descriptor_, 0, SEEK_END);
   if (end >= static_cast<off_t>(surplus) &&
       ::ftruncate(descriptor_, end - static_cast<off_t>(surplus)) != 0) {

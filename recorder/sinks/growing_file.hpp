@@ -28,16 +28,17 @@ class GrowingFile {
   /// @throws std::system_error with the name of the file if a write fails.
   template <class ChooseKept>
   void append(std::string_view bytes, const ChooseKept& choose_kept) {
-    const std::size_t written = try_append(bytes);
-    if (written < bytes.size()) fail(written - choose_kept(written));
+    int error = 0;
+    const std::size_t written = try_append(bytes, error);
+    if (error != 0) fail(error, written - choose_kept(written));
   }
 
   const std::filesystem::path& path() const { return path_; }
 
  private:
-  /// Returns the number of bytes written; if some are missing, errno says why.
-  std::size_t try_append(std::string_view bytes);
-  [[noreturn]] void fail(std::size_t surplus);
+  /// Returns the number of bytes written; if some are missing, `error` says why.
+  std::size_t try_append(std::string_view bytes, int& error);
+  [[noreturn]] void fail(int error, std::size_t surplus);
 
   const std::filesystem::path path_;
   const WriteCall write_;

@@ -29,13 +29,11 @@ std::unique_ptr<Autopilot> make_autopilot(const AutopilotSetup& setup) {
 }
 
 Eigen::Quaterniond calc_attitude_for(const Eigen::Vector3d& f_W, double yaw) {
-  using Eigen::Vector3d, model::make_turn;
   // The force in the frame of the heading: roll and pitch do not depend on the yaw.
-  const Vector3d f = make_turn(-yaw, Vector3d::UnitZ()) * f_W.normalized();
+  const Eigen::Vector3d f = model::make_turn(-yaw, Eigen::Vector3d::UnitZ()) * f_W.normalized();
   const double roll = math::asin(std::max(-1.0, std::min(1.0, f.y())));
   const double pitch = math::atan2(-f.x(), -f.z());
-  return make_turn(yaw, Vector3d::UnitZ()) * make_turn(pitch, Vector3d::UnitY()) *
-         make_turn(roll, Vector3d::UnitX());
+  return model::make_attitude(roll, pitch, yaw);
 }
 
 Eigen::VectorXd calc_equal_speeds(const std::vector<Rotor>& rotors, double thrust) {

@@ -4,18 +4,15 @@
 #include <cmath>
 
 #include "common/model/math.hpp"
+#include "common/model/rotation.hpp"
 
 namespace sls::control {
 namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using model::calc_antisymmetric_vector;
 using model::SharedLoad;
-
-/// Half the vector of the antisymmetric part of `m`.
-Vector3d calc_turn(const Matrix3d& m) {
-  return 0.5 * Vector3d(m(2, 1) - m(1, 2), m(0, 2) - m(2, 0), m(1, 0) - m(0, 1));
-}
 
 Matrix3d to_cross_matrix(const Vector3d& v) {
   Matrix3d m;
@@ -113,9 +110,9 @@ void CooperativeLaw::plan_attitude(const Load& load, const LawInput& input,
   // Eq. (4), with the derivatives of the designed motion.
   const Vector3d e = load.w_L - d0;
   const Matrix3d E = to_cross_matrix(e);
-  const Vector3d e_R = calc_turn(Q), e_R_dot = calc_turn(Q * E);
+  const Vector3d e_R = calc_antisymmetric_vector(Q), e_R_dot = calc_antisymmetric_vector(Q * E);
   const Vector3d e_dot = -k_R * e_R - k_W * e;
-  const Vector3d e_R_ddot = calc_turn(Q * (E * E + to_cross_matrix(e_dot)));
+  const Vector3d e_R_ddot = calc_antisymmetric_vector(Q * (E * E + to_cross_matrix(e_dot)));
   const Vector3d e_ddot = -k_R * e_R_dot - k_W * e_dot;
   const Vector3d e_3 = -k_R * e_R_ddot - k_W * e_ddot;
 
@@ -154,11 +151,7 @@ CooperativePlan CooperativeLaw::calc_plan(const LawInput& input) const {
 
 LawOutput CooperativeLaw::calc(const LawInput& input) const {
   LawOutput output;
-  const auto fail = [&output](ErrorCode error_code) {
-    output.f_Q_W.setZero();
-    output.error_code = error_code;
-    return output;
-  };
+  const auto fail = [&](ErrorCode error_code) { return without_force(output, error_code); };
   const model::Measurement& state = input.state;
   if (state.signals.size() < SharedLoad::kSignals || !state.signals.allFinite())
     return fail(ErrorCode::kNotFinite);

@@ -20,8 +20,9 @@ Vector3d calc_middle(const model::SharedLoad& load) {
 }
 
 std::vector<Vector3d> list_arms(const model::SharedLoad& load) {
+  const Vector3d middle = calc_middle(load);
   std::vector<Vector3d> arms;
-  for (const auto& cable : load.cables) arms.push_back(cable.attachment_L - calc_middle(load));
+  for (const auto& cable : load.cables) arms.push_back(cable.attachment_L - middle);
   return arms;
 }
 

@@ -15,11 +15,7 @@ using Eigen::Vector3d;
 
 LawOutput PidLaw::calc(const LawInput& input) const {
   LawOutput output;
-  const auto fail = [&output](ErrorCode error_code) {
-    output.f_Q_W.setZero();
-    output.error_code = error_code;
-    return output;
-  };
+  const auto fail = [&](ErrorCode error_code) { return without_force(output, error_code); };
   const PidAxisGains &xy = gains_.horizontal, &z = gains_.vertical;
   const model::RodDirection rod = model::to_direction(input.state.rod);
   const Vector3d &q = rod.n_W, &q_dot = rod.n_dot_W;

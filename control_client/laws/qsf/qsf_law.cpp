@@ -65,11 +65,7 @@ Vector3d calc_rod_acceleration(const Vector2d& w, const Vector2d& w_dot, const V
 QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehicle,
                    const NamedGains& gains) {
   QsfOutput output;
-  const auto fail = [&output](ErrorCode error_code) {
-    output.f_Q_W.setZero();
-    output.error_code = error_code;
-    return output;
-  };
+  const auto fail = [&](ErrorCode error_code) { return without_force(output, error_code); };
 
   // Eq. (1): error of the load position by the controller's own model.
   const model::RodDirection rod = model::to_direction(input.rod);

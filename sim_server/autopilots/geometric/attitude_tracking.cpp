@@ -2,6 +2,8 @@
 
 #include <Eigen/Geometry>
 
+#include "common/model/rotation.hpp"
+
 namespace sls::sim::geometric {
 
 using Eigen::Matrix3d, Eigen::Vector3d;
@@ -18,8 +20,7 @@ double calc_attitude_distance(const Matrix3d& R_WB, const Matrix3d& R_WB_wanted)
 }
 
 Vector3d calc_attitude_error(const Matrix3d& R_WB, const Matrix3d& R_WB_wanted) {
-  const Matrix3d A = R_WB_wanted.transpose() * R_WB;
-  return 0.5 * Vector3d(A(2, 1) - A(1, 2), A(0, 2) - A(2, 0), A(1, 0) - A(0, 1));
+  return model::calc_antisymmetric_vector(R_WB_wanted.transpose() * R_WB);
 }
 
 Vector3d calc_rate_error(const Rotation& rotation, const WantedRotation& wanted) {

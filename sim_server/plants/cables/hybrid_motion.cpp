@@ -552,8 +552,7 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
     return calc_lift(actions, now(), body) > kRounding * force_scale_;
   };
   const Members &taut = mode_.taut, &standing = mode_.standing;
-  Members candidates = find_touching(now());
-  for (const std::size_t i : taut) candidates.add(i);
+  const Members candidates = unite(find_touching(now()), taut);
   if (std::any_of(taut.begin(), taut.end(), pushes) || !(candidates == taut) ||
       std::any_of(standing.begin(), standing.end(), lifts)) {
     const Mode before = mode_;

@@ -69,22 +69,24 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
                            const config::Places& places) {
     const cables::Motion motion = cables::make_start(keys, vehicles).motion;
     const double z = *keys.ground_z;
+    constexpr double kTolerance = cables::HybridMotion::kLengthTolerance;
+    const auto stands = [z](const Eigen::Vector3d& p, const Eigen::Vector3d& v) {
+      return p.z() >= z - kTolerance && v.z() >= 0.0;
+    };
     const auto check_body = [&](const std::string& name, const Eigen::Vector3d& p,
                                 const Eigen::Vector3d& v) {
-      constexpr double kTolerance = cables::HybridMotion::kLengthTolerance;
       if (p.z() > z + kTolerance)
         throw places.make_error_at(
             "plant.ground_z_m", "expected at least " + config::to_text(p.z()) + ", the z of " +
                                     name + " at the start (z is down), got " + config::to_text(z));
-      if (p.z() >= z - kTolerance && v.z() >= 0.0 && !v.isZero(0.0))
+      if (stands(p, v) && !v.isZero(0.0))
         throw places.make_error_at("plant.initial", "expected " + name +
                                                         " at rest on the ground or rising from it, "
                                                         "got a velocity of " +
                                                         show(v));
     };
     check_body("the load", motion.p_WL, motion.v_WL);
-    if (motion.p_WL.z() >= z - cables::HybridMotion::kLengthTolerance && motion.v_WL.z() >= 0.0 &&
-        !keys.load_rates.isZero(0.0))
+    if (stands(motion.p_WL, motion.v_WL) && !keys.load_rates.isZero(0.0))
       throw places.make_error_at(
           "plant.load_rates_rad_s",
           "expected [0, 0, 0] of a load that stands on the ground, got " + show(keys.load_rates));
@@ -99,9 +101,8 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
     if (keys.load_inertia) load.inertia_L = make_inertia(*keys.load_inertia, keys.load_products);
     load.q_WL = keys.load_attitude.value_or(load.q_WL);
     for (std::size_t i = 0; i < scenario.vehicles.size(); ++i)
-      load.cables.push_back(
-          {scenario.vehicles[i].load_mass.value_or(scenario.vehicle.load_mass),
-           keys.cables.empty() ? Eigen::Vector3d(0.0, 0.0, 0.0) : keys.cables[i].attachment});
+      load.cables.push_back({scenario.vehicles[i].load_mass.value_or(scenario.vehicle.load_mass),
+                             get_cable(keys, i).attachment});
     return load;
   }
 
@@ -136,11 +137,11 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
       const config::Scenario alone = config::make_vehicle_scenario(scenario, id);
       const std::string cable = "plant.cables[" + std::to_string(id) + "]";
       const double length = alone.vehicle.rod_length;
-      if (!keys.cables.empty() && keys.cables[id].distance.value_or(0.0) > length)
-        throw places.make_error_at(cable + ".distance_m",
-                                   "expected at most the cable's length (" +
-                                       config::to_text(length) + "), got " +
-                                       config::to_text(*keys.cables[id].distance));
+      const double distance = get_cable(keys, id).distance.value_or(0.0);
+      if (distance > length)
+        throw places.make_error_at(cable + ".distance_m", "expected at most the cable's length (" +
+                                                              config::to_text(length) + "), got " +
+                                                              config::to_text(distance));
       vehicles.push_back({id, alone.vehicle, alone.plant.initial});
       const Eigen::Vector3d centre = cables::calc_load_centre(keys, vehicles.back(), id);
       if (id == 0) of_first = centre;

@@ -47,6 +47,11 @@ struct CablesKeys {
 /// Why the keys do not describe the cables of so many vehicles; empty if they do.
 std::string find_count_defect(const CablesKeys& keys, std::size_t vehicles);
 
+/// The cable of a vehicle; without a list all are alike.
+inline CableKeys get_cable(const CablesKeys& keys, std::size_t vehicle) {
+  return keys.cables.empty() ? CableKeys() : keys.cables[vehicle];
+}
+
 inline constexpr config::ListRange kCables{1, static_cast<int>(cables::kMaxCables), "cables"};
 
 inline constexpr config::ListRange kWinchStages{1, 1000, "stages"};

@@ -19,7 +19,7 @@ struct Placed {
 };
 
 Placed place_cable(const CablesKeys& keys, const PlantSetup::Vehicle& vehicle, std::size_t index) {
-  const CableKeys cable = keys.cables.empty() ? CableKeys() : keys.cables[index];
+  const CableKeys cable = get_cable(keys, index);
   model::RodAngles angles = vehicle.initial.rod;
   angles.alpha = cable.alpha.value_or(angles.alpha);
   angles.beta = cable.beta.value_or(angles.beta);
@@ -70,8 +70,7 @@ Start make_start(const CablesKeys& keys, const std::vector<PlantSetup::Vehicle>&
     const Placed placed = place_cable(keys, vehicles[i], i);
     system.load_mass += vehicles[i].parameters.load_mass;
     system.vehicle_mass[i] = vehicles[i].parameters.quad_mass;
-    system.attachment_L[i] =
-        keys.cables.empty() ? Vector3d(0.0, 0.0, 0.0) : keys.cables[i].attachment;
+    system.attachment_L[i] = get_cable(keys, i).attachment;
     motion.vehicles[i] = {
         motion.p_WL + placed.p_LE_W - placed.distance * placed.rod.n_W,
         motion.v_WL + w_W.cross(placed.p_LE_W) - placed.distance * placed.rod.n_dot_W,
