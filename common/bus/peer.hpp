@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <cstring>
 
@@ -14,22 +15,17 @@ struct PeerId {
 
 inline bool operator==(const PeerId& a, const PeerId& b) { return a.bytes == b.bytes; }
 inline bool operator!=(const PeerId& a, const PeerId& b) { return !(a == b); }
-/// In the order of the bytes. Sets and maps compare ids all the time, so two numbers are compared:
-/// the compiler would call memcmp for the array.
+/// In the order of the bytes. Sets and maps compare ids all the time, so numbers are compared: the
+/// compiler would call memcmp for the array.
 inline bool operator<(const PeerId& a, const PeerId& b) {
-  const auto head = [](const PeerId& id) {
+  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
+  const auto load = [](const PeerId& id, std::size_t first) {
     std::uint64_t number;
-    std::memcpy(&number, id.bytes.data(), sizeof number);
+    std::memcpy(&number, id.bytes.data() + first, sizeof number);
     return __builtin_bswap64(number);
   };
-  const auto tail = [](const PeerId& id) {
-    std::uint32_t number;
-    std::memcpy(&number, id.bytes.data() + sizeof(std::uint64_t), sizeof number);
-    return __builtin_bswap32(number);
-  };
-  static_assert(__BYTE_ORDER__ == __ORDER_LITTLE_ENDIAN__);
-  const std::uint64_t head_a = head(a), head_b = head(b);
-  return head_a != head_b ? head_a < head_b : tail(a) < tail(b);
+  const std::uint64_t head_a = load(a, 0), head_b = load(b, 0);
+  return head_a != head_b ? head_a < head_b : load(a, 4) < load(b, 4);  // bytes 4 to 7 are equal
 }
 
 }  // namespace sls::bus
