@@ -80,13 +80,14 @@ void FlightWatch::on_answers(const Commands& sample, const Process& sender, Inst
   client.process = &sender;
   client.hear(now);
   if (sample.run_id() != run_id_ || !has_begun_ || sample.step() != step_) return;
-  if (client.answered_step != step_) client.answers.clear();
+  if (client.answered_step != step_) {
+    client.answers.clear();
+    client.refused.clear();
+  }
   client.answered_step = step_;
   for (const ControlCommand& command : sample.vehicles())
-    if (is_sound(command, sample.step()))
-      client.answers.try_emplace(command.vehicle_id(), now);
-    else
-      client.refused = {step_, now};
+    (is_sound(command, sample.step()) ? client.answers : client.refused)
+        .try_emplace(command.vehicle_id(), now);
 }
 
 void FlightWatch::on_request(ControlAction action, Instant now) {
@@ -211,8 +212,8 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
       due = std::max(due, client.left);
       continue;
     }
-    if (client.refused && client.refused->first == record.step) {
-      due = std::max(due, client.refused->second);
+    if (client.is_refused(vehicle, record.step)) {
+      due = std::max(due, client.refused.at(vehicle));
       continue;
     }
     const Instant known_dead =

@@ -65,13 +65,16 @@ class FlightWatch {
     Instant left{0};   // its first one after that which does not
     Instant heard{0};  // its last sample
     Instant back{0};   // the first one after a long silence
-    std::optional<std::pair<std::uint64_t, Instant>> refused;  // the last defective answer
     std::uint64_t answered_step = 0;
-    std::map<std::uint32_t, Instant> answers;  // to that step, by vehicle
+    std::map<std::uint32_t, Instant> answers;  // the first ones to that step, by vehicle
+    std::map<std::uint32_t, Instant> refused;  // the first defective ones to it
 
     void hear(Instant now);
     bool has_answered(std::uint32_t vehicle, std::uint64_t step) const {
       return answered_step == step && answers.count(vehicle) > 0;
+    }
+    bool is_refused(std::uint32_t vehicle, std::uint64_t step) const {
+      return answered_step == step && refused.count(vehicle) > 0;
     }
   };
   /// Steps in a row that a vehicle was flown without an answer.
