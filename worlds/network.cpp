@@ -89,13 +89,16 @@ Peer* Network::find(const bus::PeerId& id) const {
   return nullptr;
 }
 
-bool Network::are_connected(const bus::PeerId& a, const bus::PeerId& b) const {
-  const Peer *one = find(a), *other = find(b);
-  const auto is_cut = [this](const Peer& from, const Peer& to) {
-    return links_.at({&from.process().host(), &to.process().host()}).is_cut;
-  };
-  return one->known().count(b) > 0 && other->known().count(a) > 0 && !is_cut(*one, *other) &&
-         !is_cut(*other, *one);
+std::optional<Instant> Network::find_connected_since(const bus::PeerId& a,
+                                                     const bus::PeerId& b) const {
+  Instant since{0};
+  for (const auto& [from, to] : {std::pair(find(a), find(b)), std::pair(find(b), find(a))}) {
+    const auto known = from->known().find(to->id());
+    const Link& link = links_.at({&from->process().host(), &to->process().host()});
+    if (known == from->known().end() || link.is_cut) return std::nullopt;
+    since = std::max({since, known->second, link.mended});
+  }
+  return since;
 }
 
 void Network::announce(Peer& peer) {
@@ -117,7 +120,7 @@ void Network::discover(Peer& observer, Peer& observed) {
                     [this, &observer, &observed] { discover(observer, observed); });
     return;
   }
-  observer.known_.insert(observed.id());
+  observer.known_.emplace(observed.id(), timeline_.now());
   Instant when_reader{0}, when_writer{0};  // they are announced apart, each in their order
   for (const Peer::Endpoint endpoint : observed.endpoints_) {
     Instant& when = endpoint.is_writer ? when_writer : when_reader;

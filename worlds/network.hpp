@@ -33,6 +33,7 @@ struct Link {
   double reordering = 0;  ///< a datagram is late by up to `late_by`
   Instant late_by{0};
   bool is_cut = false;
+  Instant mended{0};       ///< the end of its last cut
   double duplicates = 0;   ///< best-effort samples that are sent twice
   Instant packet_time{0};  ///< a datagram takes so long; 0: no limit
   Instant busy_until{0};   ///< of the queue before it
@@ -102,7 +103,8 @@ class Peer {
   /// Peers with a writer that lacks the deadline that our reader asks for.
   const std::set<bus::PeerId>& missing_deadlines() const { return missing_deadlines_; }
   /// All peers that were discovered.
-  const std::set<bus::PeerId>& known() const { return known_; }
+  /// The peers that it has discovered, and when.
+  const std::map<bus::PeerId, Instant>& known() const { return known_; }
   bool is_acknowledged(TopicId topic) const;
   /// Deadlines without a sample, from the first sample on.
   std::uint64_t missed_deadlines(TopicId topic);
@@ -149,7 +151,8 @@ class Peer {
   std::array<Reader, kTopics> readers_;
   std::array<History, kTopics> histories_;
   std::array<std::set<bus::PeerId>, kTopics> writers_, reader_peers_;
-  std::set<bus::PeerId> known_, missing_deadlines_;
+  std::map<bus::PeerId, Instant> known_;
+  std::set<bus::PeerId> missing_deadlines_;
 };
 
 class Network {
@@ -175,8 +178,8 @@ class Network {
   void leave(Peer& peer, bool with_goodbye);
   const std::vector<std::unique_ptr<Peer>>& peers() const { return peers_; }
   Peer* find(const bus::PeerId& id) const;
-  /// True if both know each other, and nothing is cut between them.
-  bool are_connected(const bus::PeerId& a, const bus::PeerId& b) const;
+  /// Since when both know each other and nothing is cut between them; nothing if that is not so.
+  std::optional<Instant> find_connected_since(const bus::PeerId& a, const bus::PeerId& b) const;
 
  private:
   friend class Peer;

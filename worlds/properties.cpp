@@ -239,7 +239,7 @@ void Properties::check_rivals(const Run& run, const Network& network) {
     const auto key = std::minmax(run.server, other.server);
     const bool meet = share && other.server != run.server && !other.server->process().has_ended() &&
                       !other.server->process().is_stopped() &&
-                      network.are_connected(run.server->id(), other.server->id());
+                      network.find_connected_since(run.server->id(), other.server->id());
     if (!meet) {
       rivals_.erase(key);
       continue;
@@ -343,9 +343,10 @@ void Properties::on_replied(const Program& server, std::uint64_t request_id,
   const auto run = request == requests_.end() ? runs_.end() : runs_.find(request->second);
   if (run == runs_.end() || run->second.server == &server || run->second.has_ended ||
       !run->second.has_status || timeline_.now() - run->second.phase_since < kHeardWithin ||
-      run->second.server->process().has_ended() || run->second.server->process().is_stopped() ||
-      !network.are_connected(server.id(), run->second.server->id()))
+      run->second.server->process().has_ended() || run->second.server->process().is_stopped())
     return;
+  const auto since = network.find_connected_since(server.id(), run->second.server->id());
+  if (!since || timeline_.now() - *since < kHeardWithin) return;
   find(fmt::format("operator: {} answers a request to {}", server.name(),
                    run->second.server->name()));
 }

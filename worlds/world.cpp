@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <deque>
 #include <set>
+#include <utility>
 
 #include "worlds/client_program.hpp"
 #include "worlds/foreign_program.hpp"
@@ -240,7 +241,8 @@ class World {
         Link& link = setting_.network.link(hosts_[from], hosts_[to]);
         link.loss = is_healed ? 0 : std::max(plan_.link.loss, extra_loss_);
         link.packet_time = is_healed ? Instant(0) : std::max(plan_.link.packet_time, clog_);
-        link.is_cut = !is_healed && cuts_[{from, to}] > 0;
+        const bool was_cut = std::exchange(link.is_cut, !is_healed && cuts_[{from, to}] > 0);
+        if (was_cut && !link.is_cut) link.mended = setting_.timeline.now();
       }
   }
 
