@@ -28,6 +28,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/bus/fastdds/data_sharing.hpp"
 #include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
@@ -142,6 +143,7 @@ struct Node::Impl {
     if (transports == Transports::kNetwork) leave_out_shared_memory(qos);
     if (transports == Transports::kAll) shorten_queue(qos.transport());
     is_on_this_machine = are_local(qos.transport());
+    has_memory_of_machine = is_on_this_machine && has_shared_memory(qos);
     limit_datagrams(qos);
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
@@ -252,7 +254,7 @@ struct Node::Impl {
       if (const auto memory =
               std::dynamic_pointer_cast<rtps::SharedMemTransportDescriptor>(transport))
         need = memory->segment_size();
-    need += kBesides;
+    need += kBesides + (can_share_data && are_local(qos.transport()) ? kMostSharedData : 0);
     const double free = static_cast<double>(room.f_bavail) * static_cast<double>(room.f_frsize);
     if (free < need)
       throw BusError(fmt::format("/dev/shm: expected {:.1f} MB free, got {:.1f} MB", need * 1e-6,
@@ -268,6 +270,13 @@ struct Node::Impl {
     if (transport.use_builtin_transports || own.empty())
       own.push_back(std::make_shared<rtps::UDPv4TransportDescriptor>());
     transport.use_builtin_transports = false;
+  }
+
+  /// Fast DDS shares no data from histories that grow.
+  template <class Qos>
+  void choose_data_sharing(Qos& qos) const {
+    if (bus::choose_data_sharing(qos.data_sharing(), has_memory_of_machine))
+      qos.endpoint().history_memory_policy = rtps::PREALLOCATED_MEMORY_MODE;
   }
 
   [[noreturn]] void throw_unknown_profile(const char* profile) const {
@@ -313,6 +322,7 @@ struct Node::Impl {
   // they are not deleted, because Fast DDS would use them (fastdds/README.md, trap 42).
   bool is_refused = false;
   bool is_on_this_machine = false;
+  bool has_memory_of_machine = false;       // shared memory and loopback are its only transports
   std::size_t max_datagram_bytes = 60'000;  // of UDP on loopback, and of shared memory
   std::chrono::steady_clock::time_point joined;
   Problems problems;
@@ -431,6 +441,7 @@ struct AnyWriter::Impl : dds::DataWriterListener {
   MatchedPeers peers;
   Node::Impl* node = nullptr;
   dds::DataWriter* writer = nullptr;
+  std::optional<SharedDataLock> lock;
 };
 
 AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* type_support,
@@ -443,9 +454,11 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
   if (!is_ok(impl_->node->publisher->get_datawriter_qos_from_profile(profile, qos)))
     node.impl().throw_unknown_profile(profile);
   if (!user_data.empty()) qos.user_data().data_vec({user_data.begin(), user_data.end()});
+  impl_->node->choose_data_sharing(qos);
   MiddlewareLog::clear();
   impl_->writer = impl_->node->publisher->create_datawriter(dds_topic, qos, impl_.get());
   if (!impl_->writer) node.impl().throw_refused_endpoint("write", topic, profile);
+  impl_->lock.emplace(impl_->writer->guid());
   impl_->node->neighbours.add_own(make_facts(*impl_->writer));
 }
 
@@ -513,6 +526,7 @@ struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
   std::vector<std::uint8_t>* raw = nullptr;
   Take take;
   dds::DataReader* reader = nullptr;
+  std::optional<SharedDataLock> lock;
 };
 
 AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* type_support,
@@ -529,10 +543,12 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   if (!is_ok(impl_->node->subscriber->get_datareader_qos_from_profile(profile, qos)))
     node.impl().throw_unknown_profile(profile);
   const auto& lifespan = qos.lifespan().duration;
+  impl_->node->choose_data_sharing(qos);
   if (!(lifespan == kInfinite)) impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
   MiddlewareLog::clear();
   impl_->reader = impl_->node->subscriber->create_datareader(dds_topic, qos, impl_.get());
   if (!impl_->reader) node.impl().throw_refused_endpoint("read", topic, profile);
+  impl_->lock.emplace(impl_->reader->guid());
   impl_->node->neighbours.add_own(make_facts(*impl_->reader));
 }
 

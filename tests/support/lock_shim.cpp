@@ -1,10 +1,11 @@
 /// LD_PRELOAD library that ends or stops a process while it holds a lock that it shares with other
 /// processes. After SLS_LOCK_COUNT unlocks of shared locks, the process sends itself
-/// SLS_LOCK_SIGNAL just before the next unlock of a lock of a shared-memory port that fits both
-/// variables:
-/// - SLS_LOCK_PORT: `own` for a port that this process reads, `other` for one of another process;
-/// - SLS_LOCK_KIND: `messages` for the lock over the port's messages, `waiters` for the lock over
-///   its waiting readers.
+/// SLS_LOCK_SIGNAL just before the next unlock of a lock of a shared-memory port, or of the
+/// notification of a reader that shares data, that fits all variables:
+/// - SLS_LOCK_OF: the beginning of the file's name;
+/// - SLS_LOCK_PORT: `own` for one that this process reads, `other` for one of another process;
+/// - SLS_LOCK_KIND: `messages` for the lock over the messages, `waiters` for the lock over the
+///   waiting readers.
 #include <dlfcn.h>
 #include <pthread.h>
 #include <signal.h>
@@ -22,8 +23,6 @@
 #include <optional>
 #include <set>
 #include <string>
-
-#include "fastdds_files.hpp"
 
 namespace {
 
@@ -44,11 +43,12 @@ std::string find_file(const void* address) {
   return "";
 }
 
-/// True if this process reads the port: it has open the lock file that excludes other readers.
+/// True if this process reads the port or notification: it has the file of its lock open.
 bool is_read_here(const std::string& port) {
   for (const auto& entry : std::filesystem::directory_iterator("/proc/self/fd")) {
     std::error_code gone;
-    if (std::filesystem::read_symlink(entry.path(), gone) == port + "_el") return true;
+    const auto file = std::filesystem::read_symlink(entry.path(), gone);
+    if (file == port + "_el" || file == port) return true;
   }
   return false;
 }
@@ -73,9 +73,8 @@ bool is_moment(const pthread_mutex_t* lock) {
   static std::atomic<bool> is_over{false};
   if (++given_back <= count || is_over) return false;
   const std::string file = find_file(lock);
-  if (file.find(std::string("/") + sls::bus::kSharedMemoryPrefix + "port") == std::string::npos ||
-      is_read_here(file) != is_own_wanted)
-    return false;
+  static const std::string wanted = std::string("/") + std::getenv("SLS_LOCK_OF");
+  if (file.find(wanted) == std::string::npos || is_read_here(file) != is_own_wanted) return false;
   return is_over_messages(file, lock) == are_messages_wanted && !is_over.exchange(true);
 }
 

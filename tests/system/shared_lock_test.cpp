@@ -1,15 +1,21 @@
-/// A client dies or stops while it holds a lock of a shared-memory port (its own or that of another
-/// process). The others continue, at the latest when the stopped client continues, and none dies.
+/// A client dies or stops while it holds a lock of a shared-memory port, or of the notification of
+/// a reader that shares data (its own or that of another process). The others continue, at the
+/// latest when the stopped client continues, and none dies.
 #include <gtest/gtest.h>
 #include <signal.h>
 
+#include <tuple>
+
+#include "common/bus/fastdds/stale_segments.hpp"
+#include "fastdds_files.hpp"
 #include "tests/system/flight.hpp"
 
 namespace sls::test {
 namespace {
 
-/// Parameter: the lock of a port's messages, or the lock of the list of its waiting readers.
-class SharedLockTest : public testing::TestWithParam<const char*> {
+/// Parameters: whether server and client share data; the lock of the messages, or the lock of the
+/// list of the waiting readers.
+class SharedLockTest : public testing::TestWithParam<std::tuple<bool, const char*>> {
  protected:
   /// Starts a flight of two clients. The primary sends itself `signal` in the middle of the flight,
   /// while it holds a lock of its own port or of another process's port.
@@ -24,14 +30,36 @@ class SharedLockTest : public testing::TestWithParam<const char*> {
   }
 
   void start_primary(const std::string& file, int signal, const std::string& port) {
+    const auto [shares_data, kind] = GetParam();
     FlightOptions options{{}, {}, {"--name", "primary", "--strength", "2"}, {}};
-    options.before["control_client"] = {"env",
-                                        std::string("LD_PRELOAD=") + SLS_LOCK_SHIM,
-                                        "SLS_LOCK_PORT=" + port,
-                                        std::string("SLS_LOCK_KIND=") + GetParam(),
-                                        "SLS_LOCK_COUNT=1500",
-                                        "SLS_LOCK_SIGNAL=" + std::to_string(signal)};
+    if (!shares_data) options.qos_file = make_qos_without_shared_data();
+    options.before["control_client"] = {
+        "env",
+        std::string("LD_PRELOAD=") + SLS_LOCK_SHIM,
+        "SLS_LOCK_PORT=" + port,
+        std::string("SLS_LOCK_KIND=") + kind,
+        "SLS_LOCK_OF=" + (shares_data ? bus::kDataSharingPrefix
+                                      : std::string(bus::kSharedMemoryPrefix) + "port"),
+        "SLS_LOCK_COUNT=1500",
+        "SLS_LOCK_SIGNAL=" + std::to_string(signal)};
     flight_ = std::make_unique<Flight>(file, options);
+  }
+
+  /// The same profiles as the programs' own, but the loop uses the ports.
+  std::string make_qos_without_shared_data() const {
+    const std::string endpoints = read_file(qos("endpoints"));
+    const std::string file = folder_ / "ports.xml";
+    std::string profiles;
+    for (const std::string kind : {"writer", "reader"}) {
+      const std::string end = "</data_" + kind + ">";
+      const auto from = endpoints.find("<data_" + kind + " profile_name=\"sls_loop_");
+      profiles +=
+          replace_once(endpoints.substr(from, endpoints.find(end, from) + end.size() - from),
+                       "AUTOMATIC", "OFF");
+    }
+    write_bytes(file, replace_once(read_file(qos("default")), "\n  </profiles>",
+                                   profiles + "\n  </profiles>"));
+    return file;
   }
 
   bool is_said(const char* words) const { return holds(flight_->server->output(), words); }
@@ -102,8 +130,12 @@ TEST_P(SharedLockTest, OfAnotherPortWithAStoppedClientDoesNotKeepTheServerFromEn
   EXPECT_EQ(flight_->recorder->wait(), 1) << flight_->outputs();
 }
 
-INSTANTIATE_TEST_SUITE_P(, SharedLockTest, testing::Values("messages", "waiters"),
-                         [](const auto& kind) { return std::string(kind.param); });
+INSTANTIATE_TEST_SUITE_P(, SharedLockTest,
+                         testing::Combine(testing::Bool(), testing::Values("messages", "waiters")),
+                         [](const auto& kind) {
+                           return (std::get<0>(kind.param) ? "shared_data_" : "port_") +
+                                  std::string(std::get<1>(kind.param));
+                         });
 
 }  // namespace
 }  // namespace sls::test

@@ -176,7 +176,7 @@ TEST(UsageTest, TooLittleSharedMemoryIsNamedBeforeTheFirstSample) {
     command.push_back(flags.back() == "--out" ? (folder / "recording").string()
                                               : scenario("short"));
     expect_refused(command, 1,
-                   "/dev/shm: expected 5.2 MB free, got 1.0 MB: mount -o remount,size=64M");
+                   "/dev/shm: expected 10.7 MB free, got 1.0 MB: mount -o remount,size=64M");
   }
 }
 

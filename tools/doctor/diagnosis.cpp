@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "common/bus/fastdds/stale_segments.hpp"
 #include "tools/doctor/diagnosis_parts.hpp"
 
 namespace sls::doctor {
@@ -29,7 +30,8 @@ bool is_flying(const std::string& name) {
 }
 
 std::uint64_t calc_shared_memory_need(const Settings& settings, int programs) {
-  constexpr std::uint64_t kPerProgram = 1'000'000;  // bytes: its ports and bookkeeping
+  // Bytes: its ports and bookkeeping, and what it shares of the loop.
+  constexpr std::uint64_t kPerProgram = 1'000'000 + bus::kMostSharedData;
   return static_cast<std::uint64_t>(programs) * (settings.segment_size + kPerProgram);
 }
 

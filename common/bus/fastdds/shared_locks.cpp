@@ -1,4 +1,4 @@
-/// Replaces four functions of the C library in the programs that link this file (sim_server,
+/// Replaces five functions of the C library in the programs that link this file (sim_server,
 /// control_client, recorder). These programs then keep working when another process is killed or
 /// stopped while it holds a lock in shared memory.
 ///
@@ -13,6 +13,8 @@
 ///   are in one PID namespace, so it does not work from one container to another;
 /// - a reader polls its port ten times a second, because a process may die after it has written a
 ///   message and before it wakes the reader;
+/// - a thread that shares data (data_sharing.hpp) goes on without the lock of a notification whose
+///   holder is stopped, and a reader looks for data ten times a second;
 /// - a reader waits for the locks of its own port without a time limit, because the library ends
 ///   the process of a reader that gives up after 1 s. But a process that closes its ports goes on
 ///   without a lock whose holder is stopped, because nothing reads these ports any more.
@@ -30,14 +32,18 @@
 #include <array>
 #include <atomic>
 #include <cerrno>
+#include <cinttypes>
 #include <cstdint>
+#include <cstdio>
 #include <ctime>
 #include <fstream>
 #include <string>
 #include <utility>
 
 #include "common/bus/fastdds/adaptive_spin.hpp"
+#include "common/bus/fastdds/data_sharing.hpp"
 #include "common/bus/fastdds/leaving.hpp"
+#include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/spinning.hpp"
 
 namespace sls::bus {
@@ -103,6 +109,54 @@ int take_over(int result, pthread_mutex_t* mutex) {
 thread_local const pthread_mutex_t* held = nullptr;
 thread_local bool is_held_twice = false;
 
+/// A few locks that this thread remembers, the latest ones.
+class Locks {
+ public:
+  bool hold(const pthread_mutex_t* lock) const {
+    return std::find(locks_.begin(), locks_.end(), lock) != locks_.end();
+  }
+  void add(const pthread_mutex_t* lock) {
+    if (!hold(lock)) locks_[next_++ % locks_.size()] = lock;
+  }
+  /// False if there is no such lock.
+  bool drop(const pthread_mutex_t* lock) {
+    const auto found = std::find(locks_.begin(), locks_.end(), lock);
+    if (found == locks_.end()) return false;
+    *found = nullptr;
+    return true;
+  }
+
+ private:
+  std::array<const pthread_mutex_t*, 4> locks_{};
+  std::size_t next_ = 0;
+};
+
+thread_local Locks stopped;  // their holders were stopped when this thread wanted them
+thread_local Locks forgone;  // this thread goes on without them, until it "unlocks" them
+
+/// True for an address inside the memory of an endpoint that shares data.
+bool is_of_shared_data(const void* address) {
+  std::ifstream maps("/proc/self/maps");
+  std::string line;
+  while (std::getline(maps, line)) {
+    std::uintptr_t begin = 0, end = 0;
+    if (std::sscanf(line.c_str(), "%" SCNxPTR "-%" SCNxPTR, &begin, &end) != 2) continue;
+    const auto place = reinterpret_cast<std::uintptr_t>(address);
+    if (begin <= place && place < end) return line.find(kDataSharingPrefix) != line.npos;
+  }
+  return false;
+}
+
+/// Waits at a semaphore in shared memory for a message: polls, then sleeps until `look`.
+int wait_for_message(sem_t* semaphore, const timespec& look) {
+  static const auto sleep_until = find_next(&sem_timedwait, "sem_timedwait");
+  thread_local AdaptiveSpin spin(16);
+  if (is_spinning.load(std::memory_order_relaxed) &&
+      spin.wait_for([semaphore] { return sem_trywait(semaphore) == 0; }))
+    return 0;
+  return sleep_until(semaphore, &look);
+}
+
 /// True for the semaphore of a port, which lies inside the port's memory. A named semaphore has its
 /// own mapping, so it begins a page.
 bool is_of_port(const sem_t* semaphore) {
@@ -145,7 +199,17 @@ int lock_own(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mut
   }
 }
 
-/// Takes a lock of another process's port, with little patience with a stopped holder.
+/// The result for a lock whose holder is stopped. Over a port's messages nothing may be done
+/// without it; a notification of shared data may be told twice or late.
+int give_up(const pthread_mutex_t* mutex) {
+  if (!is_of_shared_data(mutex)) return ETIMEDOUT;
+  forgone.add(mutex);
+  return 0;
+}
+
+/// Takes a lock of another process's port or of shared data, with little patience with a stopped
+/// holder. Waits for another holder of shared data without a time limit, because the library ends
+/// the process of a thread that gives up.
 int lock_other(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* mutex,
                const timespec& deadline) {
   // Not trylock, which leaves a lock that was made useless locked for ever (C library 2.36, 2.41).
@@ -153,20 +217,23 @@ int lock_other(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* m
   int result = take_over(lock_until(mutex, &past), mutex);
   if (result != ETIMEDOUT) return result;
   // If the holder was stopped the last time, the next message does not wait for 50 ms again.
-  thread_local const pthread_mutex_t* stopped = nullptr;
-  if (mutex == stopped) {
-    if (is_holder_stopped(*mutex)) return ETIMEDOUT;
-    stopped = nullptr;
+  if (stopped.drop(mutex) && is_holder_stopped(*mutex)) {
+    stopped.add(mutex);
+    return give_up(mutex);
   }
-  const timespec look = limit(deadline, kPatienceWithStopped_ns);
-  result = take_over(lock_until(mutex, &look), mutex);
-  if (result != ETIMEDOUT) return result;
-  if (is_holder_stopped(*mutex)) {
-    stopped = mutex;
-    return result;
-  }
-  return take_over(lock_until(mutex, &deadline), mutex);
+  do {
+    const timespec look = to_timespec(now_ns() + kPatienceWithStopped_ns);
+    result = take_over(lock_until(mutex, &look), mutex);
+    if (result != ETIMEDOUT) return result;
+    if (is_holder_stopped(*mutex)) {
+      stopped.add(mutex);
+      return give_up(mutex);
+    }
+  } while (now_ns() < to_ns(deadline) || is_of_shared_data(mutex));
+  return ETIMEDOUT;
 }
+
+[[maybe_unused]] const bool is_linked = can_share_data = true;
 
 }  // namespace
 }  // namespace sls::bus
@@ -195,7 +262,7 @@ int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) no
     return 0;
   }
   const int result = is_own(mutex) ? lock_own(next, mutex) : lock_other(next, mutex, *deadline);
-  if (result == 0) held = mutex;
+  if (result == 0 && !forgone.hold(mutex)) held = mutex;
   return result;
 }
 
@@ -203,6 +270,7 @@ int pthread_mutex_unlock(pthread_mutex_t* mutex) noexcept {
   using namespace sls::bus;
   static const auto next = find_next(&pthread_mutex_unlock, "pthread_mutex_unlock");
   if ((mutex->__data.__kind & kRobustBit) == 0) return next(mutex);  // of this process
+  if (forgone.drop(mutex)) return 0;
   if (mutex == held) {
     if (std::exchange(is_held_twice, false)) return 0;
     held = nullptr;
@@ -217,10 +285,16 @@ int sem_timedwait(sem_t* semaphore, const timespec* deadline) {
   static const auto next = find_next(&sem_timedwait, "sem_timedwait");
   if (!is_of_port(semaphore)) return next(semaphore, deadline);
   own_locks_to_come = 2;
-  thread_local AdaptiveSpin spin(16);
-  if (is_spinning.load(std::memory_order_relaxed) &&
-      spin.wait_for([semaphore] { return sem_trywait(semaphore) == 0; }))
-    return 0;
-  const timespec look = limit(*deadline, kLook_ns);
-  return next(semaphore, &look);
+  return wait_for_message(semaphore, limit(*deadline, kLook_ns));
+}
+
+// Fast DDS waits so for shared data alone.
+int sem_wait(sem_t* semaphore) {
+  using namespace sls::bus;
+  static const auto next = find_next(&sem_wait, "sem_wait");
+  thread_local const sem_t* known = nullptr;
+  if (semaphore != known && !is_of_shared_data(semaphore)) return next(semaphore);
+  known = semaphore;
+  wait_for_message(semaphore, to_timespec(now_ns() + kLook_ns));
+  return 0;  // woken without a message, the reader looks for one
 }

@@ -16,7 +16,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::string_view kPrefix = kSharedMemoryPrefix, kLock = "_el";
+constexpr std::string_view kSegmentPrefix = kSharedMemoryPrefix, kLock = "_el";
 
 /// Younger segments may not be locked yet: a segment is created a moment before its lock is taken.
 constexpr auto kCreationTime = std::chrono::seconds(10);
@@ -24,11 +24,19 @@ constexpr auto kCreationTime = std::chrono::seconds(10);
 /// The prefix, sixteen hexadecimal digits, "_el": the lock file of a participant's segment.
 bool is_segment_lock(std::string_view name) {
   constexpr std::size_t kDigits = 16;
-  if (name.size() != kPrefix.size() + kDigits + kLock.size()) return false;
-  if (name.substr(0, kPrefix.size()) != kPrefix) return false;
+  if (name.size() != kSegmentPrefix.size() + kDigits + kLock.size()) return false;
+  if (name.substr(0, kSegmentPrefix.size()) != kSegmentPrefix) return false;
   if (name.substr(name.size() - kLock.size()) != kLock) return false;
-  const auto digits = name.substr(kPrefix.size(), kDigits);
+  const auto digits = name.substr(kSegmentPrefix.size(), kDigits);
   return digits.find_first_not_of("0123456789abcdef") == digits.npos;
+}
+
+/// The shared memory of one of our endpoints for data sharing (data_sharing.hpp). Other programs'
+/// has no mark, and no lock either.
+bool is_own_shared_data(const fs::directory_entry& entry) {
+  std::error_code gone;
+  return entry.path().filename().string().rfind(kDataSharingPrefix, 0) == 0 &&
+         (entry.status(gone).permissions() & fs::perms(kOwnMark)) != fs::perms::none;
 }
 
 /// Locks a lock file while this object exists, unless another process holds the lock.
@@ -53,7 +61,7 @@ enum class PortState { kFree, kInUse, kStale };
 
 PortState find_state(int port, const fs::path& folder) {
   const fs::path file =
-      folder / (std::string(kPrefix) + "port" + std::to_string(port) + std::string(kLock));
+      folder / (std::string(kSegmentPrefix) + "port" + std::to_string(port) + std::string(kLock));
   std::error_code error;
   if (!fs::exists(file, error)) return PortState::kFree;
   return Lock(file).is_held() ? PortState::kStale : PortState::kInUse;
@@ -66,12 +74,13 @@ void visit_stale_segments(const fs::path& folder, const Visit& visit) {
   for (const auto& entry : fs::directory_iterator(folder, error)) {
     const fs::path file = entry.path();
     const std::string name = file.filename().string();
-    if (!is_segment_lock(name)) continue;
+    const bool is_shared_data = is_own_shared_data(entry);
+    if (!is_shared_data && !is_segment_lock(name)) continue;
     std::error_code ignored;  // gone meanwhile, or of another user
     const auto changed = fs::last_write_time(file, ignored);
     if (ignored || fs::file_time_type::clock::now() - changed < kCreationTime) continue;
     if (const Lock lock(file); lock.is_held())
-      visit(folder / name.substr(0, name.size() - kLock.size()), file);
+      visit(is_shared_data ? file : folder / name.substr(0, name.size() - kLock.size()), file);
   }
 }
 

@@ -3,15 +3,28 @@
 /// notifies the processes that have a stale port open; stale_segments_test.cpp names the cases.
 #pragma once
 
+#include <sys/stat.h>
+
+#include <cstdint>
 #include <filesystem>
 #include <set>
 #include <vector>
 
 namespace sls::bus {
 
-/// Removes the shared-memory segments of killed processes. Otherwise these segments, 4 MB each,
-/// would stay until the machine restarts, and with a full /dev/shm the next process would crash.
-/// Segments of living processes, which hold a lock, and of other users stay. Never throws.
+/// Beginning of the names of the files in /dev/shm that Fast DDS makes for data sharing.
+inline constexpr const char* kDataSharingPrefix = "fast_datasharing_";
+/// Mode bit of those of our endpoints, which hold a lock on them.
+inline constexpr mode_t kOwnMark = S_ISVTX;
+
+/// Largest memory that an endpoint of the loop shares, bytes: the server's last 64 states of 64
+/// vehicles. A flight of a few vehicles touches a tenth of it.
+inline constexpr std::uint32_t kMostSharedData = 5'500'000;
+
+/// Removes the shared-memory segments of killed processes, and their memory for data sharing.
+/// Otherwise these files, 4 MB and more, would stay until the machine restarts, and with a full
+/// /dev/shm the next process would crash. Those of living processes, which hold a lock, and of
+/// other users stay. Never throws.
 void remove_stale_segments(const std::filesystem::path& folder = "/dev/shm");
 
 /// The segments that `remove_stale_segments` would remove, of all owners.

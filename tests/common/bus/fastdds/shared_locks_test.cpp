@@ -16,6 +16,7 @@
 #include <string>
 #include <thread>
 
+#include "common/bus/fastdds/stale_segments.hpp"
 #include "tests/support/waiting.hpp"
 
 namespace sls::bus {
@@ -47,9 +48,12 @@ class SharedLocksTest : public testing::Test {
     sem_t semaphore;
   };
 
-  void SetUp() override {
-    void* memory =
-        mmap(nullptr, sizeof(Port), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+  void SetUp() override { make_port(-1); }
+
+  /// In the memory of the file, or of none if it is −1.
+  void make_port(int file) {
+    void* memory = mmap(nullptr, sizeof(Port), PROT_READ | PROT_WRITE,
+                        MAP_SHARED | (file < 0 ? MAP_ANONYMOUS : 0), file, 0);
     ASSERT_NE(memory, MAP_FAILED);
     port_ = static_cast<Port*>(memory);
     pthread_mutexattr_t attributes;
@@ -140,8 +144,29 @@ class SharedLocksTest : public testing::Test {
     EXPECT_EQ(reader.finish(), 0);
   }
 
+  void continue_holder() {
+    kill(holder_, SIGCONT);
+    while (waitpid(holder_, nullptr, 0) != holder_) {
+    }
+    holder_ = 0;
+  }
+
   Port* port_ = nullptr;
   pid_t holder_ = 0;
+};
+
+/// The same in the memory of an endpoint that shares data.
+class SharedDataLocksTest : public SharedLocksTest {
+ protected:
+  void SetUp() override {
+    const std::string name = std::string("/") + kDataSharingPrefix + std::to_string(getpid());
+    const int file = shm_open(name.c_str(), O_CREAT | O_EXCL | O_RDWR, 0600);
+    ASSERT_GE(file, 0);
+    shm_unlink(name.c_str());
+    ASSERT_EQ(ftruncate(file, sizeof(Port)), 0);
+    make_port(file);
+    close(file);
+  }
 };
 
 TEST_F(SharedLocksTest, TheLockOfADeadProcessGoesToTheNext) {
@@ -157,12 +182,32 @@ TEST_F(SharedLocksTest, NoProcessWaitsForAStoppedOne) {
   const auto start = Clock::now();
   for (int time = 0; time < 2; ++time) EXPECT_EQ(lock_within(kLong_s), ETIMEDOUT);
   EXPECT_LT(seconds_since(start), kSlow_s);
-  kill(holder_, SIGCONT);
-  while (waitpid(holder_, nullptr, 0) != holder_) {
-  }
-  holder_ = 0;
+  continue_holder();
   EXPECT_EQ(lock_within(kLong_s), 0);
   EXPECT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
+}
+
+TEST_F(SharedDataLocksTest, AThreadGoesOnWithoutTheLockOfAStoppedProcess) {
+  start_holder(SIGSTOP);
+  const auto start = Clock::now();
+  for (int time = 0; time < 2; ++time) {
+    EXPECT_EQ(lock_within(kLong_s), 0);
+    EXPECT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
+  }
+  EXPECT_LT(seconds_since(start), kSlow_s);
+  continue_holder();  // it still has the lock, and gives it back
+  EXPECT_EQ(lock_within(kLong_s), 0);
+  EXPECT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
+}
+
+TEST_F(SharedDataLocksTest, TheLockOfADeadProcessGoesToTheNext) {
+  start_holder(SIGKILL);
+  EXPECT_EQ(lock_within(kLong_s), 0);
+  EXPECT_EQ(pthread_mutex_unlock(&port_->mutex), 0);
+}
+
+TEST_F(SharedDataLocksTest, AReaderLooksForDataWithoutBeingWoken) {
+  EXPECT_EQ(sem_wait(&port_->semaphore), 0);
 }
 
 TEST_F(SharedLocksTest, ASlowProcessIsWaitedFor) {

@@ -53,6 +53,22 @@ TEST_F(StaleSegmentsTest, ASegmentThatIsJustBeingMadeStays) {
   EXPECT_TRUE(exists(make_name("0123456789abcdef_el")));
 }
 
+TEST_F(StaleSegmentsTest, SharedDataOfAKilledProcessIsRemovedIfItIsOurs) {
+  const std::string ours = std::string(kDataSharingPrefix) + "1", used = ours + "1",
+                    others = ours + "2";
+  for (const std::string& name : {ours, used, others}) make(name, std::chrono::seconds(60));
+  for (const std::string& name : {ours, used})
+    ASSERT_EQ(chmod((folder_ / name).c_str(), 0600 | kOwnMark), 0);
+  const int descriptor = open((folder_ / used).c_str(), O_RDONLY);
+  ASSERT_EQ(flock(descriptor, LOCK_SH), 0);
+  EXPECT_EQ(find_stale_segments(folder_.path()), std::vector<fs::path>{folder_ / ours});
+  remove_stale_segments(folder_.path());
+  EXPECT_FALSE(exists(ours));
+  EXPECT_TRUE(exists(used));
+  EXPECT_TRUE(exists(others));
+  close(descriptor);
+}
+
 TEST_F(StaleSegmentsTest, EverythingElseStays) {
   const std::string names[] = {make_name("port8160_el"),
                                make_name("port8160"),

@@ -1,0 +1,38 @@
+/// Data sharing: a reader reads a sample where the writer has put it, in memory that both map. No
+/// message is built, queued and parsed. sim_server and control_client share the samples of the loop
+/// if they use shared memory (config/qos/default.xml).
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "fastdds_api.hpp"
+
+namespace sls::bus {
+
+/// True in programs that link sls::shared_locks. In others a reader that is stopped inside a lock
+/// would stop the writer, and one that is killed there would end it.
+inline bool can_share_data = false;
+
+/// Lets an endpoint whose `policy` is automatic share data, with those processes alone that use the
+/// same /dev/shm and the same version of Fast DDS. Else, or where sharing would not work, it
+/// becomes off: in programs without `can_share_data`, and on processors that may show other
+/// processes a sample's stores in another order (Fast DDS orders them only by a notification, for
+/// which a busy reader does not wait). Returns whether it shares data.
+bool choose_data_sharing(dds::DataSharingQosPolicy& policy, bool is_on_this_machine);
+
+/// Locks the shared memory of an endpoint while this object exists, so that `remove_stale_segments`
+/// does not take it for that of a killed process. Does nothing for an endpoint without any.
+class SharedDataLock {
+ public:
+  explicit SharedDataLock(const rtps::GUID_t& endpoint);
+  ~SharedDataLock();
+  SharedDataLock(const SharedDataLock&) = delete;
+  SharedDataLock& operator=(const SharedDataLock&) = delete;
+
+ private:
+  int descriptor_ = -1;
+};
+
+}  // namespace sls::bus
