@@ -3,7 +3,7 @@ linearised through sls.cables, the law by hand from the equations of control_cli
 have a row for each vehicle; world z is down."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -44,27 +44,32 @@ class Team:
 
     @cached_property
     def arms(self) -> np.ndarray:
-        """σ of eq. (6)."""
+        """σ of (6) in the law's README."""
         return self.attachment_m - self.attachment_m.mean(axis=0)
 
     @cached_property
     def spread_inverse(self) -> np.ndarray:
-        """S⁻¹ of eq. (6)."""
+        """S⁻¹ of (6)."""
         return np.linalg.inv(sum(arm @ arm * np.eye(3) - np.outer(arm, arm) for arm in self.arms))
 
     @cached_property
     def weight(self) -> np.ndarray:
-        """F of eq. (2) at rest, N."""
+        """F of (2) at rest, N."""
         return np.array([0.0, 0.0, -self.load_mass_kg * self.gravity_m_s2])
 
     @cached_property
     def pulls(self) -> np.ndarray:
-        """μ at rest, N: eqs. (6) and (7)."""
+        """μ at rest, N: (6) and (7)."""
         level = self.arms * [1.0, 1.0, 0.0]
         outwards = (-self.weight[2] / self.count * np.tan(self.spread_rad)
                     * level / np.linalg.norm(level, axis=1).max())
         turn = self.spread_inverse @ np.cross(self.arms, outwards).sum(axis=0)
         return self._share(self.weight, np.zeros(3)) + outwards - np.cross(turn, self.arms)
+
+    @cached_property
+    def hover(self) -> np.ndarray:
+        """Forces on the vehicles at rest, N."""
+        return self.pulls - np.outer(self.mass_kg, [0.0, 0.0, self.gravity_m_s2])
 
     @cached_property
     def directions(self) -> np.ndarray:
@@ -77,7 +82,7 @@ class Team:
         return np.array([linalg.null_space(n[None]) for n in self.directions])
 
     def _share(self, force: np.ndarray, moment: np.ndarray) -> np.ndarray:
-        """ν of eq. (6) without h, of all cables."""
+        """ν of (6) without h, of all cables."""
         middle = self.attachment_m.mean(axis=0)
         return force / self.count + np.cross(self.spread_inverse @ (moment - np.cross(middle, force)), self.arms)
 
@@ -92,10 +97,7 @@ class Team:
 
     def calc_plant(self) -> tuple[np.ndarray, np.ndarray]:
         """A and B of ẋ = A x + B u, by central differences."""
-        rest = np.zeros(2 * self.size)
-        hover = np.zeros((self.count, 3))
-        hover[:, 2] = -self.mass_kg * self.gravity_m_s2
-        hover += self.pulls
+        rest, hover = np.zeros(2 * self.size), self.hover
         A, B = (np.zeros((2 * self.size, n)) for n in (2 * self.size, 3 * self.count))
         for column, step in enumerate(STEP * np.eye(2 * self.size)):
             A[:, column] = (self._calc_rates(rest + step, hover) - self._calc_rates(rest - step, hover)) / (2 * STEP)
@@ -131,7 +133,7 @@ class Team:
         return np.einsum("nki,ni->nk", self.tangents, angles.reshape(self.count, 2))
 
     def calc_law(self) -> np.ndarray:
-        """K of u = K x: eqs. (2) to (12) to first order."""
+        """K of u = K x: (2) to (12) to first order."""
         return np.column_stack([self._calc_forces(x).ravel() for x in np.eye(2 * self.size)])
 
     def _calc_forces(self, x: np.ndarray) -> np.ndarray:
@@ -164,10 +166,12 @@ class Team:
         along = np.sum(self.directions * pull, axis=1)[:, None] * self.directions
         return self.believed_kg[:, None] * moved - tension * n + along
 
-    def calc_sag(self, forces: np.ndarray) -> np.ndarray:
-        """Displacement at rest of each cable's end, m, by constant forces on the vehicles, N."""
+    def calc_sag(self, forces: np.ndarray, load_mass_kg: float | None = None) -> np.ndarray:
+        """Displacement at rest of each cable's end, m, by constant forces on the vehicles, N, and by another mass of the
+        load than the law takes it to have."""
         A, B, K = self._linear
-        x = np.linalg.solve(A + B @ K, -B @ forces.ravel())
+        loaded = replace(self, load_mass_kg=load_mass_kg or self.load_mass_kg)
+        x = np.linalg.solve(A + B @ K, -loaded._calc_rates(np.zeros(2 * self.size), self.hover + forces))
         return x[:3] + np.cross(x[3:6], self.attachment_m)
 
     # --- late forces ------------------------------------------------------------------------------

@@ -111,6 +111,15 @@ class PredictionTest(unittest.TestCase):
         # The tolerance includes the transient of the start, a few millimetres.
         self.assertAlmostEqual(found["load_error_max_x_m"], peak, delta=0.01 * peak + 0.005)
 
+    def test_a_team_of_other_masses_than_believed_hangs_as_predicted(self):
+        team = findings.read_base_team("team")
+        for load_share, mass in ((0.093, 0.255), (0.0935, 0.25), (0.0935, 0.245)):
+            outcome, found = self.fly("team", vehicle__load_mass_kg=load_share, vehicles__0__quad_mass_kg=mass)
+            self.assertEqual(outcome, "finished")
+            predicted = findings.calc_rest_error(findings.change_first(team, mass_kg=mass), 3 * load_share)
+            # Second order: 2 % of the mass tilts the load by 0.04 rad.
+            self.assertAlmostEqual(found["load_error_end_m"], predicted, delta=0.06 * predicted)
+
     def test_the_vertical_loop_ends_where_its_root_is_imaginary(self):
         for weight in (5.0, 50.0, 500.0):
             position, velocity = findings.calc_lqr_gains(weight, 2)

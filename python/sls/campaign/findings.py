@@ -87,6 +87,11 @@ def calc_vertical_limit(vertical: Sequence[float]) -> float:
     return float(np.arctan2(velocity * w, position) / w) - PERIOD_S / 2
 
 
+def describe_range(values: Sequence[float]) -> str:
+    low, high = f"{min(values):.3f} s", f"{max(values):.3f} s"
+    return low if low == high else f"{low} to {high}"
+
+
 def read_base_team(name: str) -> Team:
     return read_team(load_scenario(ROOT / f"config/campaigns/bases/{name}.yaml"))
 
@@ -106,9 +111,7 @@ def calc_rest_error(team: Team, load_mass_kg: float) -> float:
     the load lighter or heavier than `load_mass_kg`."""
     extra = np.zeros((team.count, 3))
     extra[:, 2] = (team.mass_kg - team.believed_kg) * team.gravity_m_s2
-    sag = ((load_mass_kg - team.load_mass_kg) * team.gravity_m_s2
-           / ((team.load_mass_kg + team.believed_kg.sum()) * team.gains["position"]))
-    return float(np.linalg.norm(team.calc_sag(extra) + [0.0, 0.0, sag], axis=1).max())
+    return float(np.linalg.norm(team.calc_sag(extra, load_mass_kg), axis=1).max())
 
 
 def calc_pulse_peak(gains: Sequence[float], duration_s: float = 1.0) -> float:
@@ -495,8 +498,7 @@ def study_team(table: RunTable) -> tuple[Figure, dict[str, str]]:
               "te_light_load": f"{errors[0, mass, length, 0]:.3f}",
               "te_heavy_load": f"{errors[-1, mass, length, 0]:.3f}",
               "te_load_predicted": f"{calc_rest_error(team, team.count * loads[-1]):.3f}",
-              "te_length_low": f"{min(length_limits):.3f}", "te_length_high": f"{max(length_limits):.3f}",
-              "te_flown_low": f"{flown.min():.3f}", "te_flown_high": f"{flown.max():.3f}",
+              "te_length_limits": describe_range(length_limits), "te_length_flown": describe_range(flown),
               "te_shortest": f"{lengths[0]:g}", "te_longest": f"{lengths[-1]:g}"}
     return figure, values
 
