@@ -107,8 +107,8 @@ def calc_team_limit(team: Team) -> float:
 
 
 def calc_rest_error(team: Team, load_mass_kg: float) -> float:
-    """Largest error at rest of a cable's end, m, of a law that believes the masses of `team` to be `believed_kg` and
-    the load lighter or heavier than `load_mass_kg`."""
+    """Largest error at rest of a cable's end, m. The law takes the vehicles' masses to be `believed_kg`, and the load's to
+    be that of `team` where it is `load_mass_kg`."""
     extra = np.zeros((team.count, 3))
     extra[:, 2] = (team.mass_kg - team.believed_kg) * team.gravity_m_s2
     return float(np.linalg.norm(team.calc_sag(extra, load_mass_kg), axis=1).max())
