@@ -73,7 +73,7 @@ nlohmann::json time_parts(const Options& options) {
   const std::vector<std::string> values = read_lines(options.values);
   const config::Scenario base = config::load_scenario(options.scenario);
   const closed_loop::MeasureList all(base, kMeasures);
-  const closed_loop::ErrorHistory errors = closed_loop::fly_base(base);
+  const closed_loop::FlightErrors errors = closed_loop::fly_base(base);
   double scenario = 0.0, flight = 0.0, steps = 0.0, measured = 0.0, certified = 0.0;
   std::uint64_t count = 0;
   for (const std::string& value : values) {

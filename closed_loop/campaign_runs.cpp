@@ -62,7 +62,7 @@ MeasuredFlight CampaignRuns::fly(const std::vector<std::string>& values, bool ce
 
 void CampaignRuns::check(const std::vector<std::string>& values) const {
   const config::Scenario scenario = make_scenario(values);
-  name_file(file_, [&] { check_flight(scenario); });
+  name_file(file_, [&] { check_flight(scenario, errors_); });
 }
 
 }  // namespace sls::closed_loop

@@ -13,10 +13,9 @@ namespace sls::closed_loop {
 
 class CampaignRuns {
  public:
-  /// Reads and flies the scenario `base`, of one vehicle. `paths` are the keys that vary,
-  /// `measures` the names of MeasureList; `period_s` is the control period of all runs, default:
-  /// the scenario's.
-  /// @throws config::ConfigError naming the file where `base` cannot be read, is a fleet or fails.
+  /// Reads and flies the scenario `base`. `paths` are the keys that vary, `measures` the names of
+  /// MeasureList; `period_s` is the control period of all runs, default: the scenario's.
+  /// @throws config::ConfigError naming the file where `base` cannot be read or fails.
   CampaignRuns(std::filesystem::path base, std::vector<std::string> paths,
                std::vector<std::string> measures, std::optional<double> period_s = {},
                const Poll& poll = {});
@@ -42,7 +41,7 @@ class CampaignRuns {
   config::ScenarioDraft draft_;  // with the period in force
   config::Scenario base_;
   MeasureList measures_;
-  ErrorHistory errors_;
+  FlightErrors errors_;
 };
 
 }  // namespace sls::closed_loop

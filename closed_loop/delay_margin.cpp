@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <string>
 #include <variant>
 
 #include "closed_loop/flight.hpp"
@@ -17,53 +18,71 @@ namespace {
 constexpr std::int64_t kLongestDelay = 10'000'000'000;  // ns
 constexpr std::int64_t kMostPeriods = 100'000;          // samples that a delay keeps in memory
 
-/// `scenario` with its command delayed by `periods`, after its own faults.
-config::Scenario make_delayed(config::Scenario scenario, std::int64_t periods) {
+using Ids = std::vector<std::uint32_t>;
+
+/// `scenario` with the commands of `vehicles` delayed by `periods`, after its own faults.
+config::Scenario make_delayed(config::Scenario scenario, const Ids& vehicles,
+                              std::int64_t periods) {
   config::Fault fault;
   fault.kind = "delay";
   fault.on = config::FaultChannel::kCommand;
   fault.effect = config::DelayFault{periods * scenario.sync.period_ns};
-  scenario.faults.push_back(fault);  // last: random numbers depend on a fault's place
+  for (const std::uint32_t vehicle : vehicles) {
+    fault.vehicle = static_cast<int>(vehicle);
+    scenario.faults.push_back(fault);  // last: random numbers depend on a fault's place
+  }
   return scenario;
 }
 
-/// Delay of the loop that the scenario itself has during the whole flight.
-std::int64_t calc_own_delay(const config::Scenario& scenario) {
+/// Delay of the vehicle's loop that the scenario itself has during the whole flight.
+std::int64_t calc_own_delay(const config::Scenario& scenario, std::uint32_t vehicle) {
   std::int64_t own_ns = scenario.sensing.node_delay_ns;
   const config::Fault always;
   for (const config::Fault& fault : scenario.faults) {
     const auto* delay = std::get_if<config::DelayFault>(&fault.effect);
-    if (delay && fault.from_ns == always.from_ns && fault.to_ns == always.to_ns)
+    if (delay && fault.vehicle == static_cast<int>(vehicle) && fault.from_ns == always.from_ns &&
+        fault.to_ns == always.to_ns)
       own_ns += delay->by_ns;
   }
   return own_ns;
 }
 
-/// Flies until the end or the loss. `judge` returns the reason if the load is lost at this step,
-/// else an empty text.
+std::int64_t calc_common_own_delay(const config::Scenario& scenario, const Ids& vehicles) {
+  const std::int64_t own_ns = calc_own_delay(scenario, vehicles.front());
+  const bool are_alike = std::all_of(vehicles.begin(), vehicles.end(), [&](std::uint32_t vehicle) {
+    return calc_own_delay(scenario, vehicle) == own_ns;
+  });
+  return are_alike ? own_ns : 0;
+}
+
+/// Flies until the end or the loss. `judge` gets each step of all vehicles and returns the reason
+/// if a load is lost at it, else an empty text.
 template <class Judge>
 DelayedFlight fly(const config::Scenario& scenario, std::int64_t periods, const Judge& judge) {
-  Flight flight(make_delayed(scenario, periods));
+  Flight flight(scenario, list_vehicles(scenario));
   DelayedFlight result;
   result.periods = periods;
   model::ErrorStatistics errors;
-  while (const auto step = flight.fly_step()) {
-    errors.add(step->truth.p_WL - step->answer.reference.position);
-    result.loss = judge(*step, calc_load_error(*step));
+  std::uint64_t count = 0;
+  while (flight.fly_step()) {
+    ++count;
+    for (const model::StepRecord& step : flight.steps())
+      errors.add(step.truth.p_WL - step.answer.reference.position);
+    result.loss = judge(flight.steps());
     if (result.is_lost()) break;
   }
   if (!result.is_lost()) result.loss = flight.failure();
   if (result.is_lost())
-    result.loss += describe_time(calc_last_time_ns(errors.samples(), scenario.sync.period_ns));
+    result.loss += describe_time(calc_last_time_ns(count, scenario.sync.period_ns));
   result.worst_error = errors.calc_max(model::kNorm);
   result.rms_error = errors.calc_rms(model::kNorm);
   return result;
 }
 
 /// The flight without added delay, with which the others are compared.
-DelayedFlight fly_undelayed(const config::Scenario& scenario, ErrorHistory& errors) {
-  DelayedFlight result = fly(scenario, 0, [&](const model::StepRecord& step, double error) {
-    errors.add(step, error);
+DelayedFlight fly_undelayed(const config::Scenario& scenario, FlightErrors& errors) {
+  DelayedFlight result = fly(scenario, 0, [&](const std::vector<model::StepRecord>& steps) {
+    add_errors(steps, errors);
     return std::string();
   });
   if (result.is_lost())
@@ -71,14 +90,11 @@ DelayedFlight fly_undelayed(const config::Scenario& scenario, ErrorHistory& erro
   return result;
 }
 
-DelayedFlight fly_delayed(const config::Scenario& scenario, std::int64_t periods,
-                          const ErrorHistory& undelayed) {
-  const double rod_length = config::make_vehicle_scenario(scenario, 0).vehicle.rod_length;
-  return fly(scenario, periods, [&](const model::StepRecord& step, double error) {
-    return is_load_lost(step, error, undelayed, rod_length)
-               ? describe_loss(rod_length, "without delay")
-               : std::string();
-  });
+DelayedFlight fly_delayed(const config::Scenario& scenario, const Ids& vehicles,
+                          std::int64_t periods, const FlightErrors& undelayed) {
+  const LossRule rule(scenario, undelayed, "without delay");
+  return fly(make_delayed(scenario, vehicles, periods), periods,
+             [&](const std::vector<model::StepRecord>& steps) { return rule.judge(steps); });
 }
 
 std::string to_seconds_text(std::int64_t nanoseconds) {
@@ -103,19 +119,25 @@ const DelayedFlight* DelayMargin::longest_held() const {
 }
 
 DelayMargin find_delay_margin(const config::Scenario& scenario,
+                              std::optional<std::uint32_t> vehicle,
                               const std::function<void(const DelayedFlight&)>& after_flight) {
+  const std::size_t count = scenario.vehicles.size();
+  if (vehicle && *vehicle >= count)
+    throw config::ConfigError("--vehicle: expected one of " + scenario.name + ", 0 to " +
+                              std::to_string(count - 1) + ", got " + std::to_string(*vehicle));
+  const Ids vehicles = vehicle ? Ids{*vehicle} : list_vehicles(scenario);
   DelayMargin margin;
   margin.period_ns = scenario.sync.period_ns;
-  margin.own_ns = calc_own_delay(scenario);
+  margin.own_ns = calc_common_own_delay(scenario, vehicles);
   const auto add = [&](const DelayedFlight& flight) {
     margin.flights.push_back(flight);
     if (after_flight) after_flight(flight);
     return flight.is_lost();
   };
-  ErrorHistory undelayed;
+  FlightErrors undelayed;
   add(fly_undelayed(scenario, undelayed));
   const auto is_lost_with = [&](std::int64_t periods) {
-    return add(fly_delayed(scenario, periods, undelayed));
+    return add(fly_delayed(scenario, vehicles, periods, undelayed));
   };
 
   const std::int64_t most =

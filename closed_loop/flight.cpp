@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <exception>
+#include <numeric>
 #include <utility>
 
 namespace sls::closed_loop {
@@ -10,6 +11,12 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 }  // namespace
+
+std::vector<std::uint32_t> list_vehicles(const config::Scenario& scenario) {
+  std::vector<std::uint32_t> ids(scenario.vehicles.size());
+  std::iota(ids.begin(), ids.end(), 0);
+  return ids;
+}
 
 Flight::Flight(const config::Scenario& scenario, const std::vector<std::uint32_t>& ids,
                const FlightOptions& options)

@@ -24,6 +24,9 @@ struct FlightOptions {
   control::LawMaker make_law = &control::make_control_law;
 };
 
+/// The ids of all vehicles of `scenario`.
+std::vector<std::uint32_t> list_vehicles(const config::Scenario& scenario);
+
 class Flight {
  public:
   /// Begins at step 0, with the vehicles `ids` (ascending) of `scenario`, whose period is the one

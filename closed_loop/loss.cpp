@@ -3,6 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "common/config/numbers.hpp"
 
@@ -20,9 +21,22 @@ double ErrorHistory::find(const model::StepRecord& step) const {
   return errors[std::min(since_start, errors.size() - 1)];
 }
 
-std::string describe_loss(double rod_length, const std::string& comparison) {
-  return fmt::format("load more than {} m further from its reference than {}",
-                     config::to_text(rod_length), comparison);
+void add_errors(const std::vector<model::StepRecord>& steps, FlightErrors& errors) {
+  errors.resize(steps.size());
+  for (std::size_t i = 0; i < steps.size(); ++i) errors[i].add(steps[i], calc_load_error(steps[i]));
+}
+
+LossRule::LossRule(const config::Scenario& scenario, const FlightErrors& base,
+                   std::string comparison)
+    : base_(base), comparison_(std::move(comparison)) {
+  for (const config::VehicleVariant& vehicle : scenario.vehicles)
+    rod_lengths_.push_back(vehicle.rod_length.value_or(scenario.vehicle.rod_length));
+}
+
+std::string LossRule::describe_loss(std::size_t vehicle) const {
+  const std::string name = rod_lengths_.size() > 1 ? fmt::format("vehicle {}: ", vehicle) : "";
+  return fmt::format("{}load more than {} m further from its reference than {}", name,
+                     config::to_text(rod_lengths_[vehicle]), comparison_);
 }
 
 std::string describe_time(std::int64_t time_ns) {

@@ -29,14 +29,34 @@ class ErrorHistory {
   std::vector<std::vector<double>> stages_;
 };
 
-/// True if the load error `error` is more than one rod length (m) larger than in the flight `base`.
-inline bool is_load_lost(const model::StepRecord& step, double error, const ErrorHistory& base,
-                         double rod_length) {
-  return error - base.find(step) > rod_length;
-}
+/// The histories of all vehicles of a flight, by id.
+using FlightErrors = std::vector<ErrorHistory>;
 
-/// A text for such a loss; `comparison` completes "further from its reference than …".
-std::string describe_loss(double rod_length, const std::string& comparison);
+/// Adds a step of all vehicles.
+void add_errors(const std::vector<model::StepRecord>& steps, FlightErrors& errors);
+
+/// A load is lost if its error is more than one rod length larger than in the flight `base`.
+class LossRule {
+ public:
+  /// For all vehicles of `scenario`, as many as in `base`, which must outlive the rule.
+  /// `comparison` completes "further from its reference than …".
+  LossRule(const config::Scenario& scenario, const FlightErrors& base, std::string comparison);
+
+  /// Why a load is lost at this step of all vehicles; empty if none is.
+  std::string judge(const std::vector<model::StepRecord>& steps) const {
+    for (std::size_t i = 0; i < steps.size(); ++i)
+      if (calc_load_error(steps[i]) - base_[i].find(steps[i]) > rod_lengths_[i])
+        return describe_loss(i);
+    return {};
+  }
+
+ private:
+  std::string describe_loss(std::size_t vehicle) const;
+
+  const FlightErrors& base_;
+  const std::string comparison_;
+  std::vector<double> rod_lengths_;  // of each vehicle, m
+};
 
 /// Time of the last of `steps` answered steps, ns: when a flight ended or lost its load.
 inline std::int64_t calc_last_time_ns(std::uint64_t steps, std::int64_t period_ns) {

@@ -1,7 +1,6 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
-#include <numeric>
 #include <optional>
 
 #include "closed_loop/recorded_flight.hpp"
@@ -38,9 +37,7 @@ int main(int argc, char** argv) {
     const auto began = std::chrono::steady_clock::now();
     closed_loop::FlightEnd end;
     if (folder.empty()) {
-      std::vector<std::uint32_t> ids(scenario.vehicles.size());
-      std::iota(ids.begin(), ids.end(), 0);
-      closed_loop::Flight flown(scenario, ids, flight);
+      closed_loop::Flight flown(scenario, closed_loop::list_vehicles(scenario), flight);
       while (app::stop_signal() == 0 && flown.fly_step()) end.last_step = flown.steps()[0].step;
       end.failure = app::stop_signal() != 0 ? "interrupted" : flown.failure();
     } else {

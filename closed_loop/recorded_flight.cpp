@@ -1,7 +1,5 @@
 #include "closed_loop/recorded_flight.hpp"
 
-#include <numeric>
-
 #include "closed_loop/flight_recorder.hpp"
 #include "common/app/options.hpp"
 #include "common/app/stop_signal.hpp"
@@ -12,8 +10,7 @@ namespace sls::closed_loop {
 
 FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& options,
                        const std::filesystem::path& folder, bool force) {
-  std::vector<std::uint32_t> ids(scenario.vehicles.size());
-  std::iota(ids.begin(), ids.end(), 0);
+  const std::vector<std::uint32_t> ids = list_vehicles(scenario);
   Flight flight(scenario, ids, options);
   FlightRecorder recorder(folder, force,
                           sim::make_parameters_message(sim::make_run_id(), ids, scenario,

@@ -3,7 +3,6 @@
 #include <pybind11/stl.h>
 
 #include <memory>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,11 +23,7 @@ using Ids = std::vector<std::uint32_t>;
 
 Ids list_ids(const config::Scenario& scenario, std::optional<std::uint32_t> vehicle) {
   const std::size_t count = scenario.vehicles.size();
-  if (!vehicle) {
-    Ids ids(count);
-    std::iota(ids.begin(), ids.end(), 0);
-    return ids;
-  }
+  if (!vehicle) return closed_loop::list_vehicles(scenario);
   if (*vehicle >= count)
     throw config::ConfigError("vehicle: expected one of " + scenario.name + ", 0 to " +
                               std::to_string(count - 1) + ", got " + std::to_string(*vehicle));

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <complex>
+#include <optional>
 
 #include "closed_loop/flight.hpp"
 #include "tests/closed_loop/support.hpp"
@@ -114,6 +115,61 @@ TEST(DelayMarginTest, EveryShorterDelayHoldsAndTheNextOneDoesNot) {
     Flight flight(delay_command(scenario, periods));
     while (flight.fly_step()) continue;
     EXPECT_EQ(flight.failure().empty(), periods < lost) << periods;
+  }
+}
+
+/// True if a flight of all vehicles ends without a failure.
+bool holds(const config::Scenario& scenario) {
+  Flight flight(scenario, list_vehicles(scenario));
+  while (flight.fly_step()) continue;
+  return flight.failure().empty();
+}
+
+TEST(DelayMarginTest, OfAGroupAllVehiclesOrOneAreDelayed) {
+  const config::Scenario team = load_short_team();
+  for (const std::optional<std::uint32_t> only : {std::optional<std::uint32_t>(), {2}}) {
+    const auto delay = [&](std::int64_t periods) {
+      if (only) return delay_command(team, periods, static_cast<int>(*only));
+      config::Scenario delayed = team;
+      for (int i = 0; i < 3; ++i) delayed = delay_command(delayed, periods, i);
+      return delayed;
+    };
+    const DelayMargin margin = find_delay_margin(team, only);
+    ASSERT_NE(margin.shortest_lost(), nullptr);
+    const std::int64_t lost = margin.shortest_lost()->periods;
+    EXPECT_EQ(margin.longest_held()->periods, lost - 1);
+    EXPECT_TRUE(holds(delay(lost - 1))) << lost;
+    EXPECT_FALSE(holds(delay(lost))) << lost;
+    EXPECT_EQ(margin.shortest_lost()->loss.rfind("vehicle ", 0), 0u) << to_text(margin);
+  }
+}
+
+TEST(DelayMarginTest, OtherVehiclesOfAFleetDoNotMatter) {
+  config::Scenario fleet = load("mixed_fleet");
+  fleet.plant.model.name = "analytic";
+  fleet.plant.own = {};
+  const DelayMargin in_fleet = find_delay_margin(fleet, 3);
+  fleet.vehicles = {fleet.vehicles[3]};
+  const DelayMargin alone = find_delay_margin(fleet);
+  ASSERT_NE(alone.shortest_lost(), nullptr);
+  EXPECT_EQ(in_fleet.shortest_lost()->periods, alone.shortest_lost()->periods);
+  EXPECT_EQ(in_fleet.shortest_lost()->loss, "vehicle 3: " + alone.shortest_lost()->loss);
+}
+
+TEST(DelayMarginTest, VehiclesThatDifferInTheirOwnDelayHaveNoCommonOne) {
+  const config::Scenario team = delay_command(load_short_team(), 2, 1);
+  EXPECT_EQ(find_delay_margin(team).own_ns, 0);
+  EXPECT_EQ(find_delay_margin(team, 1).own_ns, 8'000'000);
+  EXPECT_EQ(find_delay_margin(team, 0).own_ns, 0);
+}
+
+TEST(DelayMarginTest, AVehicleThatIsNotThereIsRefused) {
+  try {
+    find_delay_margin(load_short_team(), 3);
+    FAIL() << "no error";
+  } catch (const config::ConfigError& error) {
+    EXPECT_STREQ(error.what(),
+                 "--vehicle: expected one of three_carry_a_triangle_pose, 0 to 2, got 3");
   }
 }
 

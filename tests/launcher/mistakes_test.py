@@ -43,6 +43,7 @@ MISTAKES = {
     "run short --domain 233": "--domain: expected 0 to 232, got '233' (see ./sls run --help)",
     "run short --domain one": "--domain: expected 0 to 232, got 'one' (see ./sls run --help)",
     "run short --period-s 4ms": "--period-s: expected a number > 0, got '4ms' (see ./sls run --help)",
+    "delay-margin short --vehicle x": "--vehicle: expected 0 to 255, got 'x' (see ./sls delay-margin --help)",
     "delay-margin short --period-s 0": "--period-s: expected a number > 0, got '0' (see ./sls delay-margin --help)",
     "run short --mode real-time": "--mode: expected lockstep or realtime, got 'real-time' (see ./sls run --help)",
     "run short --rtf -1": "--rtf: expected a number > 0 and <= 1000, got '-1' (see ./sls run --help)",

@@ -94,8 +94,8 @@ class CampaignRunsTest(support.FolderTest):
                 ("expected 1 values, one for each path, got 0", lambda: make().check([])),
                 ("measure: expected load_error_rms, .* got 'mean'", lambda: make(["mean"])),
                 ("short.yaml: --period-s: expected > 0, got -1", lambda: make(period_s=-1.0)),
-                ("fleet.yaml: vehicles: expected one vehicle",
-                 lambda: make(base=str(SCENARIOS / "fleet.yaml"))),
+                ("short.yaml: vehicles: expected 1, as in the base scenario, got 2",
+                 lambda: _sls_core.Runs(file, ["vehicles"], ["outcome"]).check(["2"])),
                 ("nothing.yaml: expected a scenario file, got none", lambda: make(base="nothing.yaml"))):
             with self.subTest(message):
                 with self.assertRaisesRegex(_sls_core.ConfigError, message) as raised:

@@ -2,7 +2,9 @@
 them."""
 
 import sys
+import tempfile
 import unittest
+from pathlib import Path
 
 import support
 import numpy as np
@@ -18,6 +20,7 @@ from sls.campaign import findings
 from sls.campaign.campaign_file import load_campaign
 from sls.campaign.check import check_campaign
 from sls.campaign.sampling import make_values, to_yaml_value
+from sls.input_error import InputError
 
 FOLDER = support.ROOT / "config/campaigns"
 FILES = sorted(FOLDER.glob("*.yaml"))
@@ -51,6 +54,17 @@ class ShippedCampaignsTest(unittest.TestCase):
                 runs.check(list_values(campaign, 0))
                 runs.check(list_values(campaign, campaign.runs - 1))
                 check_campaign(campaign, runs)
+
+    def test_another_number_of_vehicles_is_refused_with_the_line_of_the_campaign(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "numbers.yaml"
+            file.write_text(f"base: {support.ROOT}/config/scenarios/short.yaml\nvary:\n  vehicles: {{ list: [1, 2] }}\n"
+                            "measure: [outcome]\n")
+            campaign = load_campaign(file)
+            with self.assertRaises(InputError) as raised:
+                check_campaign(campaign, make_runs(campaign))
+            self.assertEqual(str(raised.exception), f"{file}:3: vary.vehicles: run 1: expected 1, as in the base "
+                             "scenario, got 2")
 
     def test_both_laws_of_a_pair_get_the_same_disturbances(self):
         campaign = load_campaign(FOLDER / "law_comparison.yaml")
@@ -110,6 +124,15 @@ class PredictionTest(unittest.TestCase):
         peak = force * findings.calc_pulse_peak(findings.calc_lqr_gains(10, 4))
         # The tolerance includes the transient of the start, a few millimetres.
         self.assertAlmostEqual(found["load_error_max_x_m"], peak, delta=0.01 * peak + 0.005)
+
+    def test_a_team_of_other_masses_than_believed_hangs_as_predicted(self):
+        team = findings.read_base_team("team")
+        for load_share, mass in ((0.093, 0.255), (0.0935, 0.25), (0.0935, 0.245)):
+            outcome, found = self.fly("team", vehicle__load_mass_kg=load_share, vehicles__0__quad_mass_kg=mass)
+            self.assertEqual(outcome, "finished")
+            predicted = findings.calc_rest_error(findings.change_first(team, mass_kg=mass), 3 * load_share)
+            # Second order: 2 % of the mass tilts the load by 0.04 rad.
+            self.assertAlmostEqual(found["load_error_end_m"], predicted, delta=0.06 * predicted)
 
     def test_the_vertical_loop_ends_where_its_root_is_imaginary(self):
         for weight in (5.0, 50.0, 500.0):

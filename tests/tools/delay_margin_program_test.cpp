@@ -61,6 +61,8 @@ TEST(DelayMarginProgramTest, MistakesGiveOneLineAndExitCodeTwo) {
   expect_refused(program_with({"--scenario", "none.yaml"}), 2, "none.yaml: ");
   expect_refused(program_with({"--scenario", scenario("short"), "--period-s", "0.0035"}), 2,
                  "--period-s");
+  expect_refused(program_with({"--scenario", scenario("short"), "--vehicle", "1"}), 2,
+                 "--vehicle: expected one of short, 0 to 0, got 1");
   expect_refused(
       program_with({"--scenario", std::string(SLS_SOURCE_DIR) +
                                       "/tests/common/config/invalid/delay_negative.yaml"}),

@@ -8,26 +8,31 @@ derived in the page, findings_page.md."""
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import matplotlib
 import numpy as np
+import yaml
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from scipy import linalg, signal
 
 from sls.campaign.pairs import Pairs, describe_changes, find_pairs
-from sls.campaign.run_table import RunTable, read_runs
+from sls.campaign.run_table import OUTCOMES, RunTable, read_runs
 from sls.campaign.statistics import calc_wilson_interval
 from sls.delay_formula import HorizontalChain, calc_stability_limit
 from sls.figures import STYLE, colour_of, save
 from sls.input_error import InputError
+from sls.scenario import ROOT, load_scenario
+from sls.team_formula import Team, read_team
 
 HERE = Path(__file__).resolve().parent
-NAMES = ("mass_and_delay", "gains", "wind", "integral", "px4_ingredients", "law_comparison")
+NAMES = ("mass_and_delay", "gains", "wind", "integral", "px4_ingredients", "law_comparison", "team", "team_failure")
 QUAD_MASS_KG, LOAD_MASS_KG, ROD_LENGTH_M, GRAVITY_M_S2 = 1.5, 0.2, 1.0, 9.8  # of every base
 PERIOD_S = 0.004
 CLASS_COLOURS = ("#d7e6f4", "#f6c78f", "#d55e00", "#7f7f7f")
@@ -80,6 +85,33 @@ def calc_vertical_limit(vertical: Sequence[float]) -> float:
     position, velocity = vertical
     w = np.sqrt((velocity**2 + np.sqrt(velocity**4 + 4.0 * position**2)) / 2.0)
     return float(np.arctan2(velocity * w, position) / w) - PERIOD_S / 2
+
+
+def describe_range(values: Sequence[float]) -> str:
+    low, high = f"{min(values):.3f} s", f"{max(values):.3f} s"
+    return low if low == high else f"{low} to {high}"
+
+
+def read_base_team(name: str) -> Team:
+    return read_team(load_scenario(ROOT / f"config/campaigns/bases/{name}.yaml"))
+
+
+def change_first(team: Team, **changes: float) -> Team:
+    """The team with other numbers of vehicle 0: `mass_kg`, `length_m`."""
+    return replace(team, **{name: np.array([value, *getattr(team, name)[1:]]) for name, value in changes.items()})
+
+
+def calc_team_limit(team: Team) -> float:
+    """The longest delay, in whole periods, of the forces of vehicle 0 with which small motions decay, s."""
+    return PERIOD_S * team.find_delay_limit([vehicle == 0 for vehicle in range(team.count)], PERIOD_S)
+
+
+def calc_rest_error(team: Team, load_mass_kg: float) -> float:
+    """Largest error at rest of a cable's end, m. The law takes the vehicles' masses to be `believed_kg`, and the load's to
+    be that of `team` where it is `load_mass_kg`."""
+    extra = np.zeros((team.count, 3))
+    extra[:, 2] = (team.mass_kg - team.believed_kg) * team.gravity_m_s2
+    return float(np.linalg.norm(team.calc_sag(extra, load_mass_kg), axis=1).max())
 
 
 def calc_pulse_peak(gains: Sequence[float], duration_s: float = 1.0) -> float:
@@ -414,9 +446,116 @@ def study_law_comparison(table: RunTable) -> tuple[Figure, dict[str, str]]:
         "lc_worse": str(int(np.sum(errors[in_qsf][both] > errors[in_pid][both])))}
 
 
+def study_team(table: RunTable) -> tuple[Figure, dict[str, str]]:
+    keys = ("vehicle.load_mass_kg", "vehicles.0.quad_mass_kg", "vehicles.0.rod_length_m", "faults.0.delay.by_s")
+    loads, masses, lengths, delays = list_values(table, *keys)
+    shape = (len(loads), len(masses), len(lengths), len(delays))
+    outcome = to_map(table, "outcome", shape)
+    errors = np.where(outcome == 0, to_map(table, "load_error_end_m", shape), np.nan)
+    team = read_base_team("team")
+    load, mass, length = (int(np.argmin(np.abs(values - true))) for values, true in
+                          ((loads, team.load_mass_kg / team.count), (masses, team.mass_kg[0]),
+                           (lengths, team.length_m[0])))
+    held = np.array([(row != 0).argmax() if np.any(row) else len(delays)
+                     for row in outcome.reshape(-1, len(delays))]).reshape(shape[:-1])
+    mass_limits = np.array([calc_team_limit(change_first(team, mass_kg=value)) for value in masses])
+    length_limits = [calc_team_limit(change_first(team, length_m=value)) for value in lengths]
+
+    figure, (left, right) = make_figure(2, "A team of three, law cooperative", 9.6, 3.9)
+    draw_classes(left, masses, delays, np.where(outcome == 0, 0, outcome + 1)[load, :, length].T)
+    left.plot(masses, mass_limits, color="#0b5394", linewidth=2, drawstyle="steps-mid")
+    left.set_xlabel("mass of vehicle 0 (kg); the law assumes 0.25")
+    left.set_ylabel("delay of its forces (s)")
+    left.legend(handles=[Patch(color=CLASS_COLOURS[place], label=label) for place, label in
+                         ((0, "finishes"), (2, "lost"), (3, "failed"))]
+                + [Line2D([], [], color="#0b5394", linewidth=2, label="linear: end of stability")],
+                loc="upper left", frameon=True, framealpha=0.9)
+    fine = np.linspace(masses[0], masses[-1], 61)
+    for place, share in enumerate(loads):
+        whole = team.count * share
+        right.plot(masses, errors[place, :, length, 0], color=colour_of(place), marker="o", markersize=3,
+                   linestyle="none", label=f"load of {whole:.3g} kg")
+        right.plot(fine, [calc_rest_error(change_first(team, mass_kg=value), whole) for value in fine],
+                   color=colour_of(place), linewidth=1)
+    right.set_xlabel("mass of vehicle 0 (kg); the law assumes 0.25")
+    right.set_ylabel("largest error of an end at rest (m)")
+    right.legend(loc="upper center")
+
+    flown = delays[held[load, mass] - 1]
+    known = outcome[load, :, length, 0] == 0
+    predicted = np.array([calc_rest_error(change_first(team, mass_kg=value), team.load_mass_kg) for value in masses])
+    gap = np.abs(delays[held[load, :, length] - 1] - mass_limits)[known].max()
+    values = {"te_runs": str(len(table)), "te_lost": str(table.count("lost")), "te_failed": str(table.count("failed")),
+              "te_held": f"{delays[held[load, mass, length] - 1]:.3f}",
+              "te_lost_at": f"{delays[held[load, mass, length]]:.3f}",
+              "te_limit": f"{mass_limits[mass]:.3f}",
+              "te_lightest": f"{masses[known][0]:.3f}", "te_heaviest": f"{masses[known][-1]:.3f}",
+              "te_limit_light": f"{mass_limits[known][0]:.3f}", "te_limit_heavy": f"{mass_limits[known][-1]:.3f}",
+              "te_gap": f"{gap:.3f}",
+              "te_error": f"{errors[load, mass + 2, length, 0]:.3f}",
+              "te_extra": f"{masses[mass + 2] - masses[mass]:.3f}",
+              "te_predicted": f"{predicted[mass + 2]:.3f}",
+              "te_light_load": f"{errors[0, mass, length, 0]:.3f}",
+              "te_heavy_load": f"{errors[-1, mass, length, 0]:.3f}",
+              "te_load_predicted": f"{calc_rest_error(team, team.count * loads[-1]):.3f}",
+              "te_length_limits": describe_range(length_limits), "te_length_flown": describe_range(flown),
+              "te_shortest": f"{lengths[0]:g}", "te_longest": f"{lengths[-1]:g}"}
+    return figure, values
+
+
+def study_team_failure(table: RunTable) -> tuple[Figure, dict[str, str]]:
+    gains, cuts = list_values(table, "controller.gains.attitude", "plant.cables.0.release_s")
+    words = table.words["faults.0"][0]
+    shape = (len(gains), len(cuts), len(words))
+    outcome = to_map(table, "outcome", shape)
+    errors = np.where(outcome == 0, to_map(table, "load_error_max_m", shape), np.nan)
+    lost_n = [yaml.safe_load(word).get("bias", {}).get("force_n", [0, 0, 0])[2] for word in words]
+    frozen = next(place for place, word in enumerate(words) if "freeze" in word)
+    lifts = [place for place in range(len(words)) if place != frozen]
+    by_lift = np.array(lost_n)[lifts]
+
+    figure, (left, right) = make_figure(2, "One of six vehicles fails while the box moves", 9.6, 3.9)
+    team = read_base_team("six_vehicles")
+    fine = np.linspace(0.0, by_lift[-1], 2)
+    for place, gain in enumerate(gains):
+        rates = 2.0 * float(np.sqrt(gain))
+        firm = replace(team, gains={**team.gains, "attitude": float(gain), "rates": rates})
+        left.plot(by_lift, errors[place, 1, lifts], color=colour_of(place), marker="o", markersize=3, linestyle="none",
+                  label=f"k_R = {gain:g}")
+        push = np.zeros((team.count, 3))
+        push[0, 2] = 1.0
+        slope = np.linalg.norm(firm.calc_sag(push), axis=1).max()
+        left.plot(fine, slope * fine, color=colour_of(place), linewidth=1)
+    left.set_xlabel("lift that vehicle 0 loses (N)")
+    left.set_ylabel("largest error of an end (m)")
+    left.legend(loc="upper left")
+    right.plot(gains, errors[:, 0, 0], color=colour_of(0), marker="o", markersize=4, label="its cable is cut")
+    for place, chosen in ((1, 0.5), (2, 1.0)):
+        right.plot(gains, errors[:, 1, lost_n.index(chosen)], color=colour_of(place), marker="o", markersize=4,
+                   label=f"it loses {chosen:g} N of lift")
+    right.axhline(0.5, color="#444444", linewidth=0.8, linestyle=":", label="lost: a cable's length")
+    right.set_xlabel("k_R of the attitude (1/s²)")
+    right.set_ylabel("largest error of an end (m)")
+    right.legend(loc="upper right")
+
+    def describe(run: tuple[int, int, int]) -> str:
+        return f"{errors[run]:.3f}" if outcome[run] == 0 else OUTCOMES[outcome[run]]
+
+    rows = "\n".join(
+        f"| {gain:g} | " + " | ".join(
+            [describe((row, 0, 0)), describe((row, 1, frozen)),
+             *(describe((row, 1, place)) for place in lifts[1:])]) + " |" for row, gain in enumerate(gains))
+    is_cut_off = np.array_equal(errors[:, 0], np.repeat(errors[:, 0, :1], len(words), axis=1), equal_nan=True)
+    return figure, {"tf_runs": str(len(table)), "tf_rows": rows,
+                    "tf_lifts": " | ".join(f"{value:g} N less lift" for value in by_lift[1:]),
+                    "tf_rule": " | ".join("---" for _ in by_lift[1:]),
+                    "tf_cut_off": "nothing" if is_cut_off else "something"}
+
+
 STUDIES = {"mass_and_delay": study_mass_and_delay, "gains": study_gains, "wind": study_wind,
            "integral": study_integral, "px4_ingredients": study_px4_ingredients,
-           "law_comparison": study_law_comparison}
+           "law_comparison": study_law_comparison, "team": study_team,
+           "team_failure": study_team_failure}
 
 
 def write_findings(campaigns: Path, out: Path) -> Path:

@@ -98,11 +98,13 @@ def start(program: str, folder: str = "bin") -> Callable[[list[str]], int]:
 
 
 def delay_margin(words: list[str]) -> NoReturn:
-    parser = Parser("delay-margin", "SCENARIO [--period-s X]",
-                    "Finds the command delay at which the controller loses the load; prints a table.")
+    parser = Parser("delay-margin", "SCENARIO [--period-s X] [--vehicle N]",
+                    "Finds the command delay at which the controllers lose the load; prints a table.")
     parser.add_argument("--period-s", type=POSITIVE, metavar="X", help="control period (default: the scenario's)")
+    parser.add_argument("--vehicle", type=whole(0, 255), metavar="N",
+                        help="delay the commands of vehicle N alone (default: of all)")
     options, scenario = parser.parse_scenario(words)
-    replace_by_program("delay_margin", [f"--scenario={scenario}", *flights.pass_on(options, "period_s")])
+    replace_by_program("delay_margin", [f"--scenario={scenario}", *flights.pass_on(options, "period_s", "vehicle")])
 
 
 def worlds(words: list[str]) -> NoReturn:
