@@ -19,7 +19,7 @@ namespace {
 /// The keys of every shared library. A plant in a library may have an attitude.
 template <class Section>
 class LibraryKeys : public OwnKeys<Section, LibraryParameters> {
-  bool has_attitude() const override { return true; }
+  bool has_attitude(const Section&) const override { return true; }
 };
 
 }  // namespace

@@ -43,7 +43,9 @@ class ModelKeys {
   /// True for a plant whose vehicles have an attitude. The scenario may then have an initial
   /// attitude and attitude errors (`estimator`); a plant of the project also accepts an
   /// `autopilot`.
-  virtual bool has_attitude() const { return false; }
+  virtual bool has_attitude(const Section&) const { return false; }
+  /// The key with which they have one, of a plant whose vehicles can also be point masses.
+  virtual std::string find_attitude_key() const { return ""; }
   /// The shape of the vehicles of a plant.
   virtual VehicleShape calc_shape(const Section&) const { return {}; }
   /// The one load of a plant whose vehicles carry it together. Called after `check`.

@@ -106,10 +106,14 @@ std::string to_too_long(std::int64_t period_ns) {
 /// Checks the keys of plants whose vehicles have an attitude, and of their autopilot.
 void check_autopilot(const Scenario& scenario, const Places& places) {
   const ModelName& model = scenario.plant.model;
-  if (model.is_shared_library() || !find_model_keys(places.models().plants, model).has_attitude()) {
+  const auto& plants = places.models().plants;
+  if (model.is_shared_library() || !find_model_keys(plants, model).has_attitude(scenario.plant)) {
     std::string takers;
-    for (const auto& [name, keys] : places.models().plants)
-      if (keys->has_attitude()) takers += (takers.empty() ? "'" : " or '") + name + "'";
+    for (const auto& [name, keys] : plants) {
+      const std::string key = keys->find_attitude_key();
+      if (key.empty() && !keys->has_attitude(Plant())) continue;
+      takers += (takers.empty() ? "'" : " or '") + name + "'" + (key.empty() ? "" : " with " + key);
+    }
     for (const char* key :
          {"autopilot", "plant.initial.attitude", "plant.initial.body_rates_rad_s"})
       if (places.has(key))
@@ -218,7 +222,9 @@ void check_sensing(const Scenario& scenario, const Places& places) {
 void check_estimator(const Scenario& scenario, const Places& places) {
   const ModelName& model = scenario.plant.model;
   const model::AttitudeError& error = scenario.estimator.attitude;
-  if (error.is_zero() || find_model_keys(places.models().plants, model).has_attitude()) return;
+  if (error.is_zero() ||
+      find_model_keys(places.models().plants, model).has_attitude(scenario.plant))
+    return;
   const bool is_tilted = !error.tilt.isZero(0.0);
   throw places.make_error_at(
       is_tilted ? "estimator.tilt_rad" : "estimator.yaw_rad",

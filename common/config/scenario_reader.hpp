@@ -148,6 +148,10 @@ std::string to_expectation(const Field&) {
   if constexpr (std::is_same_v<Field, std::vector<Stage>>) return "a list of stages";
   return "a map";
 }
+template <class Field>
+std::string to_expectation(const std::optional<Field>&) {
+  return to_expectation(Field{});
+}
 
 /// The `Map` that reads: describe(reader, field) fills `field` from the file.
 class MapReader {

@@ -118,7 +118,8 @@ class PythonClient {
   /// Prepares new laws and a new list of their errors for the next run.
   void prepare_law() {
     const bool has_attitude =
-        config::find_model_keys(config::all_models().plants, scenario_.plant.model).has_attitude();
+        config::find_model_keys(config::all_models().plants, scenario_.plant.model)
+            .has_attitude(scenario_.plant);
     errors_ = std::make_shared<LawErrors>();
     options_.make_law = make_python_law_maker(law_, has_attitude, errors_);
   }

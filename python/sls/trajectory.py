@@ -51,7 +51,7 @@ class Body:
     thrust_set: np.ndarray
     """Set-point of the thrust, (n,), N."""
     rod_tension: np.ndarray
-    """(n,), N."""
+    """Of the rod or of the own cable, (n,), N."""
 
     def take(self, rows: np.ndarray) -> "Body":
         return Body(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
@@ -131,7 +131,7 @@ def read_body(state: Columns) -> Body | None:
         rotor_speed_set=columns(*(f"rotor_{n}_set_rad_s" for n in numbers)),
         thrust=columns("thrust_n")[:, 0],
         thrust_set=asked("thrust_set_n")[:, 0],
-        rod_tension=columns("rod_tension_n")[:, 0])
+        rod_tension=columns("cable_tension_n" if rotors and "cable_tension_n" in state else "rod_tension_n")[:, 0])
     is_known = any(np.any(np.isfinite(getattr(body, field.name))) for field in fields(body))
     return body if is_known else None
 

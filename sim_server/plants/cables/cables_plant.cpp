@@ -43,6 +43,10 @@ CablesPlant::CablesPlant(const PlantSetup& setup, const cables::Start& start)
       remark_counts_(setup.vehicles.size()) {
   actions_.air = setup.plant.air;
   actions_.disturbance_W = setup.plant.disturbance_W;
+  if (const auto& airframe = setup.plant.own.get<CablesKeys>().airframe) {
+    rotors_.emplace(*airframe, setup, motion_);
+    actions_.propulsion = &*rotors_;
+  }
   plan(setup.plant.own.get<CablesKeys>());
   signals_ = list_signals();
   for (std::size_t i = 0; i < system_.count; ++i) {
@@ -98,6 +102,7 @@ void CablesPlant::plan(const CablesKeys& keys) {
 /// A step of the plant, in parts where something changes inside it.
 void CablesPlant::fly_step() {
   const double start = static_cast<double>(steps_) * step_s_;
+  if (rotors_) rotors_->begin_step(actions_.f_Q_W, steps_, motion_);
   for (double flown = 0.0; flown < step_s_;) {
     double until = step_s_;
     for (; next_change_ < changes_.size(); ++next_change_) {
@@ -121,6 +126,7 @@ void CablesPlant::fly_step() {
     }
     flown = until;
   }
+  if (rotors_) rotors_->end_step(motion_);
 }
 
 void CablesPlant::apply(const Change& change) {
@@ -169,6 +175,10 @@ model::Measurement CablesPlant::measure(std::size_t vehicle) const {
   if (has_release_) add(motion_.is_cut(vehicle));
   if (system_.ground_z_W)
     for (const std::size_t body : {cables::kLoad, vehicle}) add(motion_.standing().has(body));
+  if (rotors_) {
+    measured.attitude = cables::to_attitude(motion.turns[vehicle]);
+    for (const double number : rotors_->calc_signals(vehicle, motion_)) add(number);
+  }
   return measured;
 }
 
@@ -188,6 +198,8 @@ std::vector<Signal> CablesPlant::list_signals() const {
   if (has_release_) signals.push_back({"cable_released", ""});
   if (system_.ground_z_W)
     for (const char* name : {"load_on_ground", "vehicle_on_ground"}) signals.push_back({name, ""});
+  if (rotors_)
+    for (const Signal& signal : rotors_->of(0).list_signals()) signals.push_back(signal);
   return signals;
 }
 
@@ -225,7 +237,10 @@ void CablesPlant::remark(std::size_t vehicle, const std::string& text) {
 }
 
 std::vector<std::string> CablesPlant::take_remarks(std::size_t vehicle) {
-  return std::exchange(remarks_[vehicle], {});
+  std::vector<std::string> remarks = std::exchange(remarks_[vehicle], {});
+  if (rotors_)
+    for (std::string& remark : rotors_->take_remarks(vehicle)) remarks.push_back(std::move(remark));
+  return remarks;
 }
 
 PlantType cables_type() {

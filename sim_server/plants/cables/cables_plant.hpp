@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "sim_server/plants/cables/flying_rotors.hpp"
 #include "sim_server/plants/cables/hybrid_motion.hpp"
 #include "sim_server/plants/cables/start.hpp"
 #include "sim_server/plants/cables/winch.hpp"
@@ -17,14 +18,18 @@ namespace sls::sim {
 class CablesPlant : public Plant {
  public:
   /// All vehicles of `setup` at their initial states.
-  /// @throws config::ConfigError if the scenario describes another number of cables.
+  /// @throws config::ConfigError if the scenario describes another number of cables, or an
+  ///   autopilot refuses it.
   explicit CablesPlant(const PlantSetup& setup);
+  CablesPlant(const CablesPlant&) = delete;
+  CablesPlant& operator=(const CablesPlant&) = delete;
 
   void advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_t steps) override;
   /// p_WL and v_WL are those of the end of the vehicle's own cable.
   const model::Measurement& measurement(std::size_t vehicle) const override {
     return measurements_[vehicle];
   }
+  bool has_attitude() const override { return rotors_.has_value(); }
   std::vector<Signal> signals() const override { return signals_; }
   std::vector<std::string> take_remarks(std::size_t vehicle) override;
 
@@ -49,6 +54,7 @@ class CablesPlant : public Plant {
   const cables::System system_;
   const double step_s_;
   cables::HybridMotion motion_;
+  std::optional<cables::FlyingRotors> rotors_;  // none: point masses
   cables::Actions actions_;
   std::int64_t steps_ = 0;
   std::vector<Change> changes_;  // by time

@@ -70,7 +70,7 @@ double get_fall(const Motion& motion, std::size_t body) {
 void stop(const Members& bodies, Motion& motion) {
   for (const std::size_t body : bodies) {
     (body == kLoad ? motion.v_WL : motion.vehicles[body].v_W).setZero();
-    if (body == kLoad) motion.w_WL_L.setZero();
+    (body == kLoad ? motion.w_WL_L : motion.turns[body].w_WB_B).setZero();
   }
 }
 
@@ -163,8 +163,16 @@ Members HybridMotion::find_touching(const Instant& instant) const {
   return find_moving(touching, mode_.standing);
 }
 
+/// The actions at an instant: with rotors, their forces and torques.
+const Actions& HybridMotion::act(const Actions& actions, const Instant& instant) const {
+  if (!actions.propulsion) return actions;
+  actions.propulsion->push(instant.motion, instant.rotors, acting_);
+  return acting_;
+}
+
 /// Forces and accelerations, with the taut cables at their length and the standing bodies still.
-void HybridMotion::pull(const Actions& actions, Instant& instant) const {
+void HybridMotion::pull(const Actions& held, Instant& instant) const {
+  const Actions& actions = act(held, instant);
   calc_free_rate(held_, instant.motion, actions, instant.rate);
   Vector offset;
   calc_offset(held_, instant.motion, instant.geometry, actions, instant.rate, mode_.taut, offset);
@@ -175,7 +183,7 @@ void HybridMotion::pull(const Actions& actions, Instant& instant) const {
   if (!mode_.standing.empty()) support(actions, instant);
 }
 
-/// The forces of the ground; README.md, eq. (11).
+/// The forces of the ground; README.md, eq. (11). `actions` are those at the instant.
 void HybridMotion::support(const Actions& actions, Instant& instant) const {
   for (const std::size_t body : mode_.standing) {
     double& force = instant.ground[body];
@@ -197,6 +205,11 @@ void HybridMotion::place(const Members& cables, Instant& instant) const {
   Geometry& geometry = instant.geometry;
   if (system_.is_rigid && !mode_.standing.has(kLoad))
     motion.q_WL /= std::sqrt(motion.q_WL.squaredNorm());
+  if (system_.has_attitude)
+    for (std::size_t i = 0; i < system_.count; ++i) {
+      Eigen::Vector4d& q = motion.turns[i].q_WB;
+      if (!mode_.standing.has(i)) q /= std::sqrt(q.squaredNorm());
+    }
   // Newton's method; the error of a step, of order h⁵, needs one correction.
   constexpr int kMostCorrections = 4;
   for (int corrections = 0;; ++corrections) {
@@ -241,7 +254,8 @@ double HybridMotion::calc_lift(const Actions& actions, const Instant& instant,
   const Members candidates = find_moving(
       unite(find_candidates(uncut_, geometry, kLengthTolerance, kLengthTolerance), mode_.taut),
       standing);
-  const Motion rate = calc_accelerations(freed, instant.motion, geometry, actions, candidates).rate;
+  const Motion rate =
+      calc_accelerations(freed, instant.motion, geometry, act(actions, instant), candidates).rate;
   const double mass = body == kLoad ? system_.load_mass : system_.vehicle_mass[body];
   const double rise = body == kLoad ? -rate.v_WL.z() : -rate.vehicles[body].v_W.z();
   return std::min(pulled, mass * rise);
@@ -257,7 +271,7 @@ void HybridMotion::keep(const Actions& actions, const Members& cables) {
 /// Which of the `candidates` are taut from now on, with the standing bodies still.
 void HybridMotion::solve(const Actions& actions, const Members& candidates) {
   const Accelerations result =
-      calc_accelerations(held_, now().motion, now().geometry, actions, candidates);
+      calc_accelerations(held_, now().motion, now().geometry, act(actions, now()), candidates);
   now().rate = result.rate;
   now().tension = result.tension;
   mode_.taut = result.taut;
@@ -268,7 +282,7 @@ void HybridMotion::solve(const Actions& actions, const Members& candidates) {
 void HybridMotion::choose(const Actions& actions, const Members& candidates) {
   solve(actions, find_moving(candidates, mode_.standing));
   while (!mode_.standing.empty()) {
-    support(actions, now());
+    support(act(actions, now()), now());
     const auto* rising =
         std::find_if(mode_.standing.begin(), mode_.standing.end(), [&](std::size_t body) {
           return calc_lift(actions, now(), body) > kRounding * force_scale_;
@@ -330,7 +344,9 @@ Vector HybridMotion::hit(const Members& meeting) {
 void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
   // The classical method, with the taut cables held.
   Instant& stage = stage_;
-  Motion sum = now().rate;
+  if (actions.propulsion)
+    actions.propulsion->turn(now().rotors, h, stage.rotors, ending_, end.rotors);
+  Motion sum;
   const auto calc_stage = [&](double share, const Motion& rate) {
     add(system_, now().motion, share * h, rate, stage.motion);
     calc_geometry(held_, stage.motion, mode_.taut, stage.geometry);
@@ -338,11 +354,12 @@ void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
     pull(actions, stage);
   };
   calc_stage(0.5, now().rate);
-  add(system_, sum, 2.0, stage.rate, sum);
+  add(system_, now().rate, 2.0, stage.rate, sum);
   calc_stage(0.5, stage.rate);
   add(system_, sum, 2.0, stage.rate, sum);
   between_.tension = stage.tension;
   if (!mode_.standing.empty()) between_.ground = stage.ground;
+  stage.rotors.swap(ending_);
   calc_stage(1.0, stage.rate);
   add(system_, sum, 1.0, stage.rate, sum);
   add(system_, now().motion, h / 6.0, sum, end.motion);
@@ -543,8 +560,10 @@ void HybridMotion::cut(std::size_t cable) {
 void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& events) {
   is_stuck_ = false;
   force_scale_ = 0.0;
+  if (actions.propulsion) acting_ = actions;
+  const Actions& first = act(actions, now());
   for (std::size_t i = 0; i < system_.count; ++i)
-    force_scale_ += system_.vehicle_mass[i] * system_.gravity + actions.f_Q_W[i].lpNorm<1>();
+    force_scale_ += system_.vehicle_mass[i] * system_.gravity + first.f_Q_W[i].lpNorm<1>();
   // Forces jump between steps: which cables pull now?
   pull(actions, now());
   const auto pushes = [&](std::size_t i) { return now().tension[i] < -kRounding * force_scale_; };

@@ -40,6 +40,9 @@ class HybridMotion {
   void set_length(std::size_t cable, double length, double rate);
   /// Between steps: from now on the cable never pulls.
   void cut(std::size_t cable);
+  /// Between steps: of all rotors, if the actions have a propulsion.
+  RotorSpeeds& rotors() { return now().rotors; }
+  const RotorSpeeds& rotors() const { return now().rotors; }
   bool is_cut(std::size_t cable) const { return !uncut_.has(cable); }
 
   const Motion& motion() const { return now().motion; }
@@ -71,6 +74,7 @@ class HybridMotion {
     Geometry geometry;  ///< of all cables
     Factor factor;      ///< of the taut ones
     Motion rate;
+    RotorSpeeds rotors;
   };
 
   /// A cable, whose limit is its length, or a body, whose limit is the ground.
@@ -93,6 +97,7 @@ class HybridMotion {
   void set_free(std::size_t body);
   void put_on_ground(const Members& bodies);
   Members find_touching(const Instant& instant) const;
+  const Actions& act(const Actions& actions, const Instant& instant) const;
   void pull(const Actions& actions, Instant& instant) const;
   void support(const Actions& actions, Instant& instant) const;
   void place(const Members& cables, Instant& instant) const;
@@ -123,6 +128,8 @@ class HybridMotion {
   std::array<Instant, 2> ends_;  // large: exchanged by their place
   std::size_t now_at_ = 0;
   Instant trial_, stage_;
+  RotorSpeeds ending_;        // for the last stage of a step
+  mutable Actions acting_;    // of the rotors at one instant; a member because it is large
   Holding between_;           // in the middle of the step last integrated
   double force_scale_ = 0.0;  // of all forces, N
   bool is_stuck_ = false;

@@ -14,7 +14,21 @@ std::string show(const Eigen::Vector3d& v) {
          config::to_text(v.z()) + "]";
 }
 
+/// With the signals of cable, load, winch, release and ground those of so many rotors fit.
+constexpr std::size_t kMostRotors = (model::kMaxNumbers - 14 - 6) / 2;
+
 class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
+  bool has_attitude(const config::Plant& plant) const override {
+    return plant.own.get<CablesKeys>().airframe.has_value();
+  }
+  std::string find_attitude_key() const override { return "rotors"; }
+
+  config::VehicleShape calc_shape(const config::Plant& plant) const override {
+    const auto& airframe = plant.own.get<CablesKeys>().airframe;
+    return airframe ? make_shape(airframe->rotors, Eigen::Vector3d::Zero())
+                    : config::VehicleShape();
+  }
+
   void check(const config::Scenario& scenario, const config::Places& places) const override {
     const auto& keys = scenario.plant.own.get<CablesKeys>();
     const std::size_t count = scenario.vehicles.size();
@@ -24,12 +38,42 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
                                                  " on one load, got " + std::to_string(count));
     const std::string defect = find_count_defect(keys, count);
     if (!defect.empty()) throw places.make_error_at("plant.cables", defect);
+    check_vehicles(keys, scenario, places);
     check_load(keys, places);
     check_start(keys, scenario, places);
     for (std::size_t i = 0; i < keys.cables.size(); ++i)
       if (keys.cables[i].winch)
         check_winch(*keys.cables[i].winch, "plant.cables[" + std::to_string(i) + "].winch",
                     scenario.vehicles[i].rod_length.value_or(scenario.vehicle.rod_length), places);
+  }
+
+  /// Points have no keys of rigid bodies, and those no keys of points; and each lifts its share.
+  static void check_vehicles(const CablesKeys& keys, const config::Scenario& scenario,
+                             const config::Places& places) {
+    if (!keys.airframe) {
+      for (const std::string key :
+           {"rotor", "inertia_kg_m2", "inertia_products_kg_m2", "disturbance_torque_n_m"})
+        if (places.has("plant." + key))
+          throw places.make_error_at("plant." + key,
+                                     "of vehicles with plant.rotors, here they are point masses");
+      return;
+    }
+    if (scenario.plant.air.rotor_drag != 0.0)
+      throw places.make_error_at(
+          "plant.rotor_drag_n_s_m",
+          "of point masses; the drag of plant.rotors is drag_constant_n_s2_m of plant.rotor");
+    if (keys.airframe->rotors.size() > kMostRotors)
+      throw places.make_error_at("plant.rotors",
+                                 "expected at most " + std::to_string(kMostRotors) +
+                                     ", whose signals fit beside those of a cable, got " +
+                                     std::to_string(keys.airframe->rotors.size()));
+    check_airframe(*keys.airframe, places);
+    for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id) {
+      const model::SlungLoadParameters vehicle = make_vehicle_scenario(scenario, id).vehicle;
+      check_inertia(*keys.airframe, vehicle.quad_mass, places);
+      check_lift(*keys.airframe, vehicle.total_mass() * vehicle.gravity,
+                 "vehicle " + std::to_string(id) + " and its share of the load", places);
+    }
   }
 
   /// Every length fits the drum, and every stage begins after the one before.
@@ -90,8 +134,16 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
       throw places.make_error_at(
           "plant.load_rates_rad_s",
           "expected [0, 0, 0] of a load that stands on the ground, got " + show(keys.load_rates));
-    for (std::size_t i = 0; i < vehicles.size(); ++i)
-      check_body("vehicle " + std::to_string(i), motion.vehicles[i].p_W, motion.vehicles[i].v_W);
+    for (std::size_t i = 0; i < vehicles.size(); ++i) {
+      const cables::Vehicle& vehicle = motion.vehicles[i];
+      check_body("vehicle " + std::to_string(i), vehicle.p_W, vehicle.v_W);
+      const Eigen::Vector3d rates = vehicles[i].initial.w_WB_B.value_or(Eigen::Vector3d::Zero());
+      if (stands(vehicle.p_W, vehicle.v_W) && !rates.isZero(0.0))
+        throw places.make_error_at("plant.initial.body_rates_rad_s",
+                                   "expected [0, 0, 0] of a vehicle that stands on the ground, "
+                                   "got " +
+                                       show(rates));
+    }
   }
 
   std::optional<model::SharedLoad> calc_shared_load(

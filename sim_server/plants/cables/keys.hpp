@@ -9,6 +9,7 @@
 
 #include "common/config/scenario_keys.hpp"
 #include "sim_server/plants/cables/complementarity.hpp"
+#include "sim_server/plants/multirotor/airframe_keys.hpp"
 
 namespace sls::sim {
 
@@ -35,6 +36,7 @@ struct CableKeys {
 };
 
 struct CablesKeys {
+  std::optional<AirframeKeys> airframe;         // of every vehicle; none: point masses
   std::vector<CableKeys> cables;                // of each vehicle; empty: all end at a point load
   std::optional<Eigen::Vector3d> load_inertia;  ///< xx, yy, zz, kg·m²; none: a point
   Eigen::Vector3d load_products = Eigen::Vector3d::Zero();  ///< xy, xz, yz, kg·m²
@@ -84,6 +86,36 @@ void describe(Map& map, CableKeys& cable) {
   map.key(kOptional, "release_s", cable.release_ns, config::kPositive);
 }
 
+/// The keys that `multirotor` has, too. `rotors` decides: with them vehicles are rigid bodies.
+template <class Map>
+void describe_airframe(Map& map, std::optional<AirframeKeys>& airframe) {
+  using config::kOptional;
+  std::optional<std::vector<RotorKeys>> rotors;
+  std::optional<RotorNumbers<double>> rotor;
+  std::optional<Eigen::Vector3d> inertia, products, torque;
+  if (airframe) {
+    rotors = airframe->rotors;
+    rotor = airframe->rotor;
+    inertia = airframe->inertia;
+    products = airframe->products;
+    torque = airframe->disturbance_torque;
+  }
+  map.key(kOptional, "rotors", rotors, kRotors);
+  const config::Presence presence = rotors ? config::kRequired : kOptional;
+  map.key(presence, "rotor", rotor);
+  map.key(presence, "inertia_kg_m2", inertia, config::kPositive);
+  map.key(kOptional, "inertia_products_kg_m2", products);
+  map.key(kOptional, "disturbance_torque_n_m", torque);
+  if (!rotors) return;
+  const Eigen::Vector3d none = Eigen::Vector3d::Zero();
+  airframe.emplace();
+  airframe->rotors = *rotors;
+  airframe->rotor = rotor.value_or(airframe->rotor);
+  airframe->inertia = inertia.value_or(none);
+  airframe->products = products.value_or(none);
+  airframe->disturbance_torque = torque.value_or(none);
+}
+
 template <class Map>
 void describe_own(Map& map, config::Plant& plant, CablesKeys& keys) {
   using config::kOptional;
@@ -94,6 +126,7 @@ void describe_own(Map& map, config::Plant& plant, CablesKeys& keys) {
   map.key(kOptional, "load_rates_rad_s", keys.load_rates);
   map.key(kOptional, "restitution", keys.restitution, config::kProbability);
   map.key(kOptional, "ground_z_m", keys.ground_z, config::kFinite);
+  describe_airframe(map, keys.airframe);
   config::describe_point_mass_loads(map, plant);
 }
 

@@ -13,17 +13,6 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-/// R of the load, also for a quaternion of another length than 1, as between the stages of a step.
-Matrix3d calc_rotation(const Eigen::Vector4d& q) {
-  const double scale = 2.0 / q.squaredNorm();
-  const double w = q[0], x = q[1], y = q[2], z = q[3];
-  Matrix3d rotation;
-  rotation << 1.0 - scale * (y * y + z * z), scale * (x * y - w * z), scale * (x * z + w * y),
-      scale * (x * y + w * z), 1.0 - scale * (x * x + z * z), scale * (y * z - w * x),
-      scale * (x * z - w * y), scale * (y * z + w * x), 1.0 - scale * (x * x + y * y);
-  return rotation;
-}
-
 /// ½ q ∘ (0, w).
 Eigen::Vector4d calc_quaternion_rate(const Eigen::Vector4d& q, const Vector3d& w) {
   const Vector3d vector = q.tail<3>();
@@ -37,6 +26,17 @@ Eigen::Vector4d calc_quaternion_rate(const Eigen::Vector4d& q, const Vector3d& w
 bool stands(double mass) { return std::isinf(mass); }
 
 }  // namespace
+
+// Between the stages of a step a quaternion has another length than 1.
+Matrix3d calc_rotation(const Eigen::Vector4d& q) {
+  const double scale = 2.0 / q.squaredNorm();
+  const double w = q[0], x = q[1], y = q[2], z = q[3];
+  Matrix3d rotation;
+  rotation << 1.0 - scale * (y * y + z * z), scale * (x * y - w * z), scale * (x * z + w * y),
+      scale * (x * y + w * z), 1.0 - scale * (x * x + z * z), scale * (y * z - w * x),
+      scale * (x * z - w * y), scale * (y * z + w * x), 1.0 - scale * (x * x + y * y);
+  return rotation;
+}
 
 System hold_still(const System& system, const Members& standing) {
   System held = system;
@@ -64,6 +64,11 @@ void add(const System& system, const Motion& start, double h, const Motion& rate
     to.v_W = from.v_W + h * change.v_W;
     to.length = from.length + h * change.length;
     to.length_rate = from.length_rate + h * change.length_rate;
+  }
+  if (!system.has_attitude) return;
+  for (std::size_t i = 0; i < system.count; ++i) {
+    sum.turns[i].q_WB = start.turns[i].q_WB + h * rate.turns[i].q_WB;
+    sum.turns[i].w_WB_B = start.turns[i].w_WB_B + h * rate.turns[i].w_WB_B;
   }
 }
 
@@ -134,6 +139,20 @@ void calc_free_rate(const System& system, const Motion& motion, const Actions& a
     if (!stands(system.vehicle_mass[i])) change.v_W.z() += system.gravity;
     change.length = vehicle.length_rate;
     change.length_rate = actions.length_acceleration[i];
+  }
+  if (!system.has_attitude) return;
+  for (std::size_t i = 0; i < system.count; ++i) {
+    const auto& [q_WB, w] = motion.turns[i];
+    Turn& change = rate.turns[i];
+    if (stands(system.vehicle_mass[i])) {
+      change.q_WB.setZero();
+      change.w_WB_B.setZero();
+      continue;
+    }
+    // Eq. (16).
+    change.q_WB = calc_quaternion_rate(q_WB, w);
+    change.w_WB_B = system.inverse_vehicle_inertia_B *
+                    (actions.torque_B[i] + (system.vehicle_inertia_B * w).cross(w));
   }
 }
 

@@ -9,6 +9,7 @@
 
 #include "common/model/parameters.hpp"
 #include "sim_server/plants/cables/complementarity.hpp"
+#include "sim_server/plants/multirotor/rotor_speed.hpp"
 
 namespace sls::sim::cables {
 
@@ -16,8 +17,11 @@ using Vectors = std::array<Eigen::Vector3d, kMaxCables>;
 
 /// The constants of a group. Cable i leads from vehicle i to a point of the load.
 struct System {
-  std::size_t count = 0;        ///< vehicles, 1 to kMaxCables
-  Vector vehicle_mass{};        ///< kg, > 0
+  std::size_t count = 0;                ///< vehicles, 1 to kMaxCables
+  Vector vehicle_mass{};                ///< kg, > 0
+  bool has_attitude = false;            ///< vehicles are rigid bodies; false: points
+  Eigen::Matrix3d vehicle_inertia_B{};  ///< of each rigid body, kg·m²
+  Eigen::Matrix3d inverse_vehicle_inertia_B{};
   Vectors attachment_L{};       ///< in the load, from its centre of mass, m
   double load_mass = 0.2;       ///< kg, > 0
   bool is_rigid = false;        ///< false: a point load, whose attitude stays
@@ -33,17 +37,41 @@ struct Vehicle {
   double length, length_rate;  ///< of its cable, m and m/s
 };
 
+/// How a rigid body is turned and turns.
+struct Turn {
+  Eigen::Vector4d q_WB;    ///< w, x, y, z; rotates vectors from the body into W
+  Eigen::Vector3d w_WB_B;  ///< in the body, rad/s
+};
+
 /// Where everything is and how it moves; as a rate, the derivative of each number.
 struct Motion {
   Eigen::Vector3d p_WL, v_WL;
   Eigen::Vector4d q_WL;    ///< w, x, y, z; rotates vectors from the load into W
   Eigen::Vector3d w_WL_L;  ///< angular velocity of the load in the load, rad/s
   std::array<Vehicle, kMaxCables> vehicles;
+  std::array<Turn, kMaxCables> turns;  ///< of the vehicles, if they have an attitude
+};
+
+struct Actions;
+
+/// The rotors of all vehicles within a step, in which their set-points are held.
+class Propulsion {
+ public:
+  virtual ~Propulsion() = default;
+  /// From `start` on over `h` seconds: the speeds with which a Runge-Kutta step computes in its
+  /// middle and at its end, and those that then are.
+  virtual void turn(const RotorSpeeds& start, double h, RotorSpeeds& middle, RotorSpeeds& end,
+                    RotorSpeeds& after) const = 0;
+  /// Writes the forces and the torques of rotors with these speeds: eq. (15).
+  virtual void push(const Motion& motion, const RotorSpeeds& speeds, Actions& actions) const = 0;
 };
 
 /// Forces and rates from outside, held over a step.
 struct Actions {
-  Vectors f_Q_W{};  ///< control force on each vehicle, N
+  Vectors f_Q_W{};     ///< control force on each vehicle, N
+  Vectors torque_B{};  ///< on each rigid body, about its centre of mass, N·m
+  /// If it is there, HybridMotion takes force and torque from it, at every instant.
+  const Propulsion* propulsion = nullptr;
   model::Aerodynamics air;
   Eigen::Vector3d disturbance_W = Eigen::Vector3d::Zero();  ///< on each vehicle, N
   Vector length_acceleration{};                             ///< of each cable, m/s²
@@ -62,6 +90,9 @@ struct Geometry {
 
 /// `system` with the bodies `standing` infinitely heavy: nothing accelerates or turns them.
 System hold_still(const System& system, const Members& standing);
+
+/// R of the unit quaternion along `q` (w, x, y, z).
+Eigen::Matrix3d calc_rotation(const Eigen::Vector4d& q);
 
 /// sum = start + h rate, for the vehicles of `system`.
 void add(const System& system, const Motion& start, double h, const Motion& rate, Motion& sum);

@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 
 #include "sim_server/plants/inertia.hpp"
+#include "sim_server/plants/multirotor/airframe.hpp"
 
 namespace sls::sim::cables {
 namespace {
@@ -54,6 +55,12 @@ Start make_start(const CablesKeys& keys, const std::vector<PlantSetup::Vehicle>&
     system.inertia_L = make_inertia(*keys.load_inertia, keys.load_products);
     system.inverse_inertia_L = system.inertia_L.inverse();
   }
+  if (keys.airframe) {
+    system.has_attitude = true;  // without fixed bodies the inertia does not depend on the mass
+    system.vehicle_inertia_B =
+        make_airframe(*keys.airframe, vehicles[0].parameters.quad_mass).inertia_C_B;
+    system.inverse_vehicle_inertia_B = system.vehicle_inertia_B.inverse();
+  }
   const Eigen::Quaterniond attitude =
       keys.load_attitude.value_or(Eigen::Quaterniond(1.0, 0.0, 0.0, 0.0));
   const Vector3d w_W = attitude.toRotationMatrix() * keys.load_rates;
@@ -75,6 +82,9 @@ Start make_start(const CablesKeys& keys, const std::vector<PlantSetup::Vehicle>&
         motion.p_WL + placed.p_LE_W - placed.distance * placed.rod.n_W,
         motion.v_WL + w_W.cross(placed.p_LE_W) - placed.distance * placed.rod.n_dot_W,
         vehicles[i].parameters.rod_length, 0.0};
+    const config::InitialState& initial = vehicles[i].initial;
+    const Eigen::Quaterniond q = initial.q_WB.value_or(Eigen::Quaterniond::Identity());
+    motion.turns[i] = {{q.w(), q.x(), q.y(), q.z()}, initial.w_WB_B.value_or(Vector3d::Zero())};
   }
   return start;
 }

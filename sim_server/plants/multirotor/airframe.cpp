@@ -17,7 +17,7 @@ Matrix3d calc_point_inertia(double mass, const Vector3d& p) {
 
 }  // namespace
 
-std::vector<FlyingRotor> make_rotors(const MultirotorKeys& keys) {
+std::vector<FlyingRotor> make_rotors(const AirframeKeys& keys) {
   std::vector<FlyingRotor> rotors;
   for (const RotorKeys& described : keys.rotors) {
     const RotorNumbers<double>& all = keys.rotor;
@@ -40,7 +40,7 @@ std::vector<FlyingRotor> make_rotors(const MultirotorKeys& keys) {
   return rotors;
 }
 
-Airframe make_airframe(const MultirotorKeys& keys, double quad_mass) {
+Airframe make_airframe(const AirframeKeys& keys, double quad_mass) {
   Airframe airframe;
   airframe.mass = quad_mass;
   double bare_mass = quad_mass;

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "sim_server/autopilots/autopilot.hpp"
-#include "sim_server/plants/multirotor/keys.hpp"
+#include "sim_server/plants/multirotor/airframe_keys.hpp"
 
 namespace sls::sim {
 
@@ -19,10 +19,10 @@ struct FlyingRotor : Rotor {
 };
 
 /// The rotors that the keys describe, their axes of length 1.
-std::vector<FlyingRotor> make_rotors(const MultirotorKeys& keys);
+std::vector<FlyingRotor> make_rotors(const AirframeKeys& keys);
 
 /// The body with everything fixed to it. `quad_mass` is the mass of the whole.
-Airframe make_airframe(const MultirotorKeys& keys, double quad_mass);
+Airframe make_airframe(const AirframeKeys& keys, double quad_mass);
 
 /// Largest collective thrust of a level vehicle at rest, N.
 double calc_largest_lift(const std::vector<FlyingRotor>& rotors);

@@ -13,20 +13,16 @@ using config::to_text;
 
 class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> {
  public:
-  bool has_attitude() const override { return true; }
+  bool has_attitude(const config::Plant&) const override { return true; }
 
   config::VehicleShape calc_shape(const config::Plant& plant) const override {
     const auto& keys = plant.own.get<MultirotorKeys>();
-    config::VehicleShape shape{keys.attachment, {}};
-    for (const RotorKeys& rotor : keys.rotors)
-      shape.rotors.push_back({rotor.position, rotor.spin == Spin::kCounterClockwise ? 1 : -1});
-    return shape;
+    return make_shape(keys.rotors, keys.attachment);
   }
 
   void check(const config::Scenario& scenario, const config::Places& places) const override {
     const auto& keys = scenario.plant.own.get<MultirotorKeys>();
-    check_inertia(keys, places);
-    check_rotors(keys, places);
+    check_airframe(keys, places);
     check_pendulum(keys, places);
     for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id)
       check_vehicle(keys, config::make_vehicle_scenario(scenario, id).vehicle,
@@ -36,35 +32,6 @@ class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> 
   }
 
  private:
-  static void check_inertia(const MultirotorKeys& keys, const config::Places& places) {
-    const auto check = [&](const std::string& path, const Eigen::Vector3d& moments,
-                           const Eigen::Vector3d& products) {
-      const std::string defect = find_inertia_defect(make_inertia(moments, products));
-      if (!defect.empty()) throw places.make_error_at(path, defect);
-    };
-    check("plant.inertia_kg_m2", keys.inertia, keys.products);
-    for (std::size_t i = 0; i < keys.bodies.size(); ++i)
-      check("plant.bodies[" + std::to_string(i) + "].inertia_kg_m2", keys.bodies[i].inertia,
-            Eigen::Vector3d::Zero());
-    if (keys.rod) check("plant.rod.inertia_kg_m2", keys.rod->inertia, Eigen::Vector3d::Zero());
-    if (keys.load_inertia)
-      check("plant.load_inertia_kg_m2", *keys.load_inertia, Eigen::Vector3d::Zero());
-  }
-
-  static void check_rotors(const MultirotorKeys& keys, const config::Places& places) {
-    for (std::size_t i = 0; i < keys.rotors.size(); ++i)
-      if (keys.rotors[i].axis.isZero(0.0))
-        throw places.make_error_at("plant.rotors[" + std::to_string(i) + "].axis",
-                                   "expected a vector other than 0, got [0, 0, 0]");
-    const std::vector<FlyingRotor> rotors = make_rotors(keys);
-    for (std::size_t i = 0; i < rotors.size(); ++i)
-      if (rotors[i].min_speed > rotors[i].max_speed)
-        throw places.make_error_at("plant.rotors[" + std::to_string(i) + "]",
-                                   "expected min_speed_rad_s of at most max_speed_rad_s (" +
-                                       to_text(rotors[i].max_speed) + "), got " +
-                                       to_text(rotors[i].min_speed));
-  }
-
   static void check_pendulum(const MultirotorKeys& keys, const config::Places& places) {
     const bool is_rigid = keys.pendulum == Pendulum::kRigid;
     for (const auto& [path, is_there] :
@@ -79,17 +46,18 @@ class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> 
     if (is_rigid && !(keys.rod->inertia.z() + keys.load_inertia->z() > 0.0))
       throw places.make_error_at("plant.load_inertia_kg_m2",
                                  "expected an inertia > 0 about the rod, of rod or load, got 0");
+    const auto check_links = [&](const std::string& path, const Eigen::Vector3d& moments) {
+      const std::string defect = find_inertia_defect(moments.asDiagonal());
+      if (!defect.empty()) throw places.make_error_at(path, defect);
+    };
+    if (keys.rod) check_links("plant.rod.inertia_kg_m2", keys.rod->inertia);
+    if (keys.load_inertia) check_links("plant.load_inertia_kg_m2", *keys.load_inertia);
   }
 
   /// The equations divide by the inertia of all bodies and of the pendulum; each part may have 0.
   static void check_sums(const MultirotorKeys& keys, const model::SlungLoadParameters& vehicle,
                          const config::Places& places) {
-    const Eigen::Vector3d moments =
-        calc_principal_moments(make_airframe(keys, vehicle.quad_mass).inertia_C_B);
-    if (!(moments[0] > 1e-12 * moments[2]))  // smaller ones are rounding of 0
-      throw places.make_error_at("plant.inertia_kg_m2",
-                                 "expected an inertia > 0 about every axis, of airframe and bodies "
-                                 "together, got 0");
+    check_inertia(keys, vehicle.quad_mass, places);
     if (!keys.rod) return;
     const double distance = vehicle.rod_length - keys.rod->centre;
     const double of_masses = vehicle.load_mass * keys.rod->mass /
@@ -120,11 +88,7 @@ class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> 
                                                            to_text(keys.rod->centre));
     const double weight =
         (vehicle.total_mass() + (keys.rod ? keys.rod->mass : 0.0)) * vehicle.gravity;
-    const double lift = calc_largest_lift(make_rotors(keys));
-    if (lift < weight)
-      throw places.make_error_at("plant.rotors", "expected to lift the vehicle (" +
-                                                     to_text(weight) + " N), got " + to_text(lift) +
-                                                     " N at the largest speeds");
+    check_lift(keys, weight, "the vehicle", places);
   }
 };
 

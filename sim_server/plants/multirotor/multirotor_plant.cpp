@@ -10,20 +10,15 @@
 #include <stdexcept>
 #include <string>
 
-#include "common/model/offset.hpp"
-#include "sim_server/autopilots/autopilot.hpp"
-#include "sim_server/autopilots/rotor_wrenches.hpp"
-#include "sim_server/plants/multirotor/airframe.hpp"
 #include "sim_server/plants/multirotor/keys.hpp"
 #include "sim_server/plants/multirotor/multirotor_dynamics.hpp"
-#include "sim_server/plants/multirotor/rotor_model.hpp"
-#include "sim_server/plants/multirotor/saturation_watch.hpp"
+#include "sim_server/plants/multirotor/rotor_drive.hpp"
 #include "sim_server/plants/rod_frame.hpp"
 
 namespace sls::sim {
 namespace {
 
-using Eigen::Vector3d, Eigen::VectorXd;
+using Eigen::Vector3d;
 
 /// Coordinates and speeds in Simbody's order. Body: quaternion and position; angular velocity and
 /// velocity, both in W. Pendulum, relative to the body: quaternion; two or three speeds.
@@ -86,51 +81,30 @@ void check_finite(const Motion& motion, std::int64_t step) {
   if (!motion.u.allFinite()) throw_not_finite("rod angular velocity", step);
 }
 
-void check_finite(const AutopilotOutput& wanted, std::int64_t step) {
-  for (Eigen::Index i = 0; i < wanted.rotor_speeds.size(); ++i)
-    if (!std::isfinite(wanted.rotor_speeds[i]))
-      throw_not_finite("rotor_" + std::to_string(i + 1) + "_set_rad_s", step);
-  if (!wanted.q_WB.coeffs().allFinite()) throw_not_finite("attitude set-point", step);
-  if (!std::isfinite(wanted.thrust)) throw_not_finite("thrust_set_n", step);
-  if (wanted.direction_W && !wanted.direction_W->allFinite())
-    throw_not_finite("direction of the thrust", step);
-}
-
-using TurningRotors = std::vector<RotorSpeed>;
-
 /// The values that a step changes.
 struct StepValues {
   std::int64_t steps = 0;
-  AutopilotOutput output;  ///< the last one; its direction is in the plant's W
-  VectorXd set_points;     ///< of the rotors, within their limits, rad/s
-  VectorXd rotor_speeds;   ///< rad/s
+  RotorDrive::State rotors;
   Motion motion;
 };
 
 }  // namespace
 
 /// The multibody system at one motion. README.md, "Integration", lists Simbody's part.
-struct MultirotorPlant::Multibody : StepValues {
+struct MultirotorPlant::Multibody {
   explicit Multibody(const PlantSetup& setup)
       : keys(setup.plant.own.get<MultirotorKeys>()),
         config(setup.plant),
         vehicle(setup.vehicles[0].parameters),
-        airframe(make_airframe(keys, vehicle.quad_mass)),
-        rotors(make_rotors(keys)),
+        drive(keys, setup, 0),
         step_s(1e-9 * static_cast<double>(config.step_ns)),
         is_ideal(keys.pendulum == Pendulum::kIdeal),
-        attitude_error(model::turn(Eigen::Quaterniond::Identity(), setup.estimator.attitude)),
         body(matter.Ground(), SimTK::Transform(),
-             SimTK::Body::Rigid(make_mass_properties(airframe)), SimTK::Transform()),
+             SimTK::Body::Rigid(make_mass_properties(drive.airframe())), SimTK::Transform()),
         pendulum(add_pendulum(body, keys, vehicle)),
-        watch(rotors.size(), config.step_ns),
-        starting(rotors.size()),
-        middle(rotors.size()),
-        ending(rotors.size()) {
-    for (const FlyingRotor& rotor : rotors) {
-      lags.emplace_back(rotor, step_s);
-    }
-    make_autopilot_of(setup);
+        starting(drive.size()),
+        middle(drive.size()),
+        ending(drive.size()) {
     system.realizeTopology();
     state = system.getDefaultState();
     system.realize(state, SimTK::Stage::Instance);
@@ -140,18 +114,8 @@ struct MultirotorPlant::Multibody : StepValues {
                      pendulum.getBodyMassProperties(state),
                      is_ideal ? PendulumBody::kPoint : PendulumBody::kRigid, vehicle.gravity);
     place(setup.vehicles[0].initial);
-    start_rotors();
+    drive.start((vehicle.quad_mass + pendulum_mass) * vehicle.gravity);
     held = measure(0);
-    if (!has_yaw_authority(airframe))
-      watch.add(
-          "the rotors have no authority over yaw: they cannot turn the vehicle about z alone");
-  }
-
-  void make_autopilot_of(const PlantSetup& setup) {
-    AutopilotSetup given{setup.autopilot, setup.folder, setup.vehicles[0].id, vehicle, airframe};
-    if (given.autopilot.period_ns == 0) given.autopilot.period_ns = config.step_ns;
-    autopilot_steps = given.autopilot.period_ns / config.step_ns;
-    autopilot = make_autopilot(given);
   }
 
   void place(const config::InitialState& initial) {
@@ -176,22 +140,6 @@ struct MultirotorPlant::Multibody : StepValues {
     realize_velocities(motion);
   }
 
-  void start_rotors() {
-    output.rotor_speeds =
-        calc_equal_speeds(airframe.rotors, (vehicle.quad_mass + pendulum_mass) * vehicle.gravity);
-    set_points = output.rotor_speeds;
-    limit(set_points);
-    rotor_speeds = set_points;
-  }
-
-  /// Clamps speeds to the limits of the rotors.
-  void limit(VectorXd& wanted) const {
-    for (std::size_t i = 0; i < rotors.size(); ++i) {
-      double& speed = wanted[static_cast<Eigen::Index>(i)];
-      speed = std::max(rotors[i].min_speed, std::min(rotors[i].max_speed, speed));
-    }
-  }
-
   void realize_positions(const Motion& at) {
     std::copy_n(at.q.data(), kCoordinates, &state.updQ()[0]);
     matter.realizePositionKinematics(state);
@@ -208,54 +156,18 @@ struct MultirotorPlant::Multibody : StepValues {
     return {q_WB, q_WB.conjugate() * Vector3d(motion.u.head<3>())};
   }
 
-  // --- autopilot ---------------------------------------------------------------------------------
-
-  void step_autopilot(const Vector3d& f_Q_W, std::int64_t step) {
-    if (step % autopilot_steps == 0) {
-      AutopilotInput input;
-      input.f_Q_W = f_Q_W;
-      input.attitude = attitude();
-      input.attitude.q_WB = attitude_error * input.attitude.q_WB;
-      input.v_WQ = attitude_error * Vector3d(motion.u.segment<3>(3));
-      const AutopilotOutput& wanted = autopilot->step(input);
-      check_finite(wanted, step);  // limit() would turn a NaN into the largest speed
-      output = wanted;
-      set_points = output.rotor_speeds;
-      limit(set_points);
-      // Rotors without a lag have the new speed at once, not at the end of the step.
-      for (std::size_t i = 0; i < rotors.size(); ++i) {
-        double& speed = rotor_speeds[static_cast<Eigen::Index>(i)];
-        speed = lags[i].begin(speed, set_points[static_cast<Eigen::Index>(i)]);
-      }
-      if (output.direction_W) output.direction_W = attitude_error.conjugate() * *output.direction_W;
-    }
-    watch.look(rotors, output.rotor_speeds, step, step_s);
-  }
-
   // --- dynamics ----------------------------------------------------------------------------------
 
   /// Loads of the rotors on the body: README.md, eqs. (3) to (5).
-  RotorLoads calc_rotor_loads(const Motion& at, const TurningRotors& turning) const {
+  RotorLoads calc_rotor_loads(const Motion& at, const RotorSpeeds& turning) const {
     const SimTK::Rotation& R_WB = body.getBodyRotation(state);
     const SimTK::Vec3 v_WQ = SimTK::Vec3::getAs(at.u.data() + 3);
     const Vector3d v_B = to_eigen(~R_WB * (v_WQ - to_simtk(config.air.v_wind_W)));
     const Vector3d w_B = to_eigen(~R_WB * SimTK::Vec3::getAs(at.u.data()));
-    RotorLoads loads;
-    if (!output.direction_W) {
-      for (std::size_t i = 0; i < rotors.size(); ++i)
-        add_loads(rotors[i], turning[i], v_B + w_B.cross(rotors[i].p_BR), loads);
-      return loads;
-    }
-    // The autopilot turns the thrust instead of the body: all rotors act at the centre of mass.
-    const Vector3d axis_B = to_eigen(~R_WB * to_simtk(*output.direction_W));
-    for (std::size_t i = 0; i < rotors.size(); ++i) {
-      FlyingRotor turned = rotors[i];
-      turned.p_BR = airframe.p_BC;
-      turned.axis_B = axis_B;
-      turned.torque_constant = turned.rolling_constant = 0.0;
-      add_loads(turned, turning[i], v_B + w_B.cross(airframe.p_BC), loads);
-    }
-    return loads;
+    std::optional<Vector3d> direction_B;
+    if (const auto& direction_W = drive.state().output.direction_W)
+      direction_B = to_eigen(~R_WB * to_simtk(*direction_W));
+    return drive.calc_loads(turning.data(), v_B, w_B, direction_B);
   }
 
   /// Orientations and angular velocities at `at`, whose positions must be realized.
@@ -277,7 +189,7 @@ struct MultirotorPlant::Multibody : StepValues {
   }
 
   /// Rate of change of `at`, whose positions must be realized.
-  Motion calc_rate(const Motion& at, const TurningRotors& turning) const {
+  Motion calc_rate(const Motion& at, const RotorSpeeds& turning) const {
     const MultirotorDynamics::Rotations rotations = find_rotations(at);
     const auto& [R_WB, w_WB_W, R_WP, w_WP_W] = rotations;
     const auto accelerations = calc_accelerations(rotations, calc_rotor_loads(at, turning));
@@ -303,14 +215,15 @@ struct MultirotorPlant::Multibody : StepValues {
   /// One step of the classical Runge-Kutta method of fourth order; the rotor speeds are exact.
   void fly_step(std::int64_t step) {
     const double h = step_s;
-    for (std::size_t i = 0; i < rotors.size(); ++i) {
-      const auto k = static_cast<Eigen::Index>(i);
-      const RotorLag::Stages stages = lags[i].find_stages(rotor_speeds[k], set_points[k]);
+    const Eigen::VectorXd& speeds_now = drive.state().speeds;
+    for (std::size_t i = 0; i < drive.size(); ++i) {
+      const RotorLag::Stages stages =
+          drive.find_stages(i, speeds_now[static_cast<Eigen::Index>(i)]);
       starting[i] = stages.start;
       middle[i] = stages.middle;
       ending[i] = stages.end;
     }
-    const auto calc_rate_at = [&](const Motion& there, const TurningRotors& turning) {
+    const auto calc_rate_at = [&](const Motion& there, const RotorSpeeds& turning) {
       check_finite(there, step);
       realize_positions(there);
       return calc_rate(there, turning);
@@ -324,25 +237,26 @@ struct MultirotorPlant::Multibody : StepValues {
     next.q.tail<4>().normalize();
     check_finite(next, step);
     motion = next;
-    for (std::size_t i = 0; i < rotors.size(); ++i)
-      rotor_speeds[static_cast<Eigen::Index>(i)] = ending[i].speed;
+    for (std::size_t i = 0; i < drive.size(); ++i) drive.set_speed(i, ending[i].speed);
     realize_positions(motion);
   }
 
   /// If one of the steps throws, nothing changes but the autopilot's memory and the remarks.
   void advance(const Vector3d& f_Q_W, std::int64_t count) {
     check_finite(f_Q_W, steps, "force_x_n", "force_y_n", "force_z_n");
-    before = *this;
+    before = {steps, drive.state(), motion};
     try {
       for (std::int64_t i = 0; i < count; ++i) {
-        step_autopilot(f_Q_W, steps);
+        drive.step(f_Q_W, motion.u.segment<3>(3), attitude(), steps);
         fly_step(steps + 1);
         ++steps;
       }
       realize_velocities(motion);
       held = measure(steps);
     } catch (...) {
-      static_cast<StepValues&>(*this) = before;
+      steps = before.steps;
+      drive.set_state(before.rotors);
+      motion = before.motion;
       realize_positions(motion);
       throw;
     }
@@ -369,30 +283,27 @@ struct MultirotorPlant::Multibody : StepValues {
   }
 
   model::Numbers calc_signals() {
-    for (std::size_t i = 0; i < rotors.size(); ++i) {
-      const double speed = rotor_speeds[static_cast<Eigen::Index>(i)];
+    for (std::size_t i = 0; i < drive.size(); ++i) {
+      const double speed = drive.state().speeds[static_cast<Eigen::Index>(i)];
       starting[i] = {speed, speed * speed};
     }
     const RotorLoads loads = calc_rotor_loads(motion, starting);
     const double tension = calc_accelerations(find_rotations(motion), loads).tension;
 
-    const auto count = static_cast<Eigen::Index>(rotors.size());
-    model::Numbers signals(2 * count + 7);
-    const Eigen::Quaterniond& q = output.q_WB;
-    signals << rotor_speeds, set_points, q.w(), q.x(), q.y(), q.z(), output.thrust, loads.thrust,
-        tension;
+    model::Numbers signals = drive.calc_signals(loads.thrust);
+    signals.conservativeResize(signals.size() + 1);
+    signals[signals.size() - 1] = tension;
     return signals;
   }
 
   const MultirotorKeys keys;
   const config::Plant config;
   const model::SlungLoadParameters vehicle;
-  const Airframe airframe;
-  const std::vector<FlyingRotor> rotors;
+  RotorDrive drive;
   const double step_s;
-  std::vector<RotorLag> lags;  ///< of the rotors
   const bool is_ideal;
-  const Eigen::Quaterniond attitude_error;  ///< estimated attitude = this × true one
+  std::int64_t steps = 0;
+  Motion motion;
 
   SimTK::MultibodySystem system;
   SimTK::SimbodyMatterSubsystem matter{system};
@@ -404,13 +315,9 @@ struct MultirotorPlant::Multibody : StepValues {
 
   std::optional<MultirotorDynamics> dynamics;
 
-  std::unique_ptr<Autopilot> autopilot;
-  std::int64_t autopilot_steps = 1;  ///< plant steps per period
-  SaturationWatch watch;
-
   // Members, to avoid an allocation in every step.
-  TurningRotors starting, middle, ending;  // at the stages of a step
-  StepValues before;                       // an advance
+  RotorSpeeds starting, middle, ending;  // at the stages of a step
+  StepValues before;                     // an advance
 
   model::Measurement held;
 };
@@ -429,21 +336,13 @@ const model::Measurement& MultirotorPlant::measurement(std::size_t) const {
 }
 
 std::vector<Signal> MultirotorPlant::signals() const {
-  std::vector<Signal> signals;
-  const std::size_t count = multibody_->rotors.size();
-  for (std::size_t i = 1; i <= count; ++i)
-    signals.push_back({"rotor_" + std::to_string(i) + "_rad_s", "rad/s"});
-  for (std::size_t i = 1; i <= count; ++i)
-    signals.push_back({"rotor_" + std::to_string(i) + "_set_rad_s", "rad/s"});
-  for (const char* name : {"att_set_w", "att_set_x", "att_set_y", "att_set_z"})
-    signals.push_back({name, "1"});
-  for (const char* name : {"thrust_set_n", "thrust_n", "rod_tension_n"})
-    signals.push_back({name, "N"});
+  std::vector<Signal> signals = multibody_->drive.list_signals();
+  signals.push_back({"rod_tension_n", "N"});
   return signals;
 }
 
 std::vector<std::string> MultirotorPlant::take_remarks(std::size_t) {
-  return multibody_->watch.take_remarks();
+  return multibody_->drive.take_remarks();
 }
 
 PlantType multirotor_type() {

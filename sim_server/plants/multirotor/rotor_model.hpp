@@ -9,16 +9,11 @@
 
 #include "common/model/math.hpp"
 #include "sim_server/plants/multirotor/airframe.hpp"
+#include "sim_server/plants/multirotor/rotor_speed.hpp"
 
 namespace sls::sim {
 
-/// Speed of a rotor, and the square of the speed from which its thrust is computed.
-struct RotorSpeed {
-  double speed;   ///< rad/s
-  double square;  ///< rad²/s²
-};
-
-/// First-order lag of a rotor behind its set-point, exact over steps of constant length.
+/// First-order lag of a rotor behind its set-point, exact over steps of one length, 0 or more.
 class RotorLag {
  public:
   RotorLag(const FlyingRotor& rotor, double step_s)
@@ -50,7 +45,7 @@ class RotorLag {
   struct Means {
     Means() = default;
     explicit Means(double a) {
-      mean = -math::expm1(-a) / a;
+      mean = a > 0.0 ? -math::expm1(-a) / a : 1.0;
       // The closed form loses digits for small a: use the series.
       constexpr double kSmall = 1e-2;
       early = a > kSmall ? (1.0 - mean) / a

@@ -126,6 +126,7 @@ TEST(ShippedScenariosTest, AreThese) {
                                           "rigid_figure_eight",
                                           "rotor_drag",
                                           "rotor_drag_without_feed_forward",
+                                          "rotors_carry_a_triangle",
                                           "setpoints",
                                           "short",
                                           "six_carry_a_box",
@@ -331,6 +332,7 @@ TEST(ShippedScenariosTest, OnlyTheFleetsHaveMoreThanOneVehicle) {
                                                     {"four_carry_a_box", 4},
                                                     {"mixed_fleet", 4},
                                                     {"one_controller_dies", 3},
+                                                    {"rotors_carry_a_triangle", 3},
                                                     {"six_carry_a_box", 6},
                                                     {"three_carry_a_triangle", 3},
                                                     {"three_carry_a_triangle_pose", 3}};

@@ -11,6 +11,7 @@
 #include "sim_server/autopilots/first_order/keys.hpp"
 #include "sim_server/autopilots/geometric/keys.hpp"
 #include "sim_server/plants/multirotor/airframe.hpp"
+#include "sim_server/plants/multirotor/keys.hpp"
 #include "tests/oracle/multirotor_ode.hpp"
 #include "tests/sim_server/plants/plant_flights.hpp"
 
