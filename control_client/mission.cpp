@@ -8,18 +8,48 @@ namespace {
 
 enum class StageOutcome { kGoesOn, kLeft, kTimedOut };
 
-StageOutcome judge(const config::LeaveAfter& leave, std::int64_t elapsed_ns,
-                   const model::SlungLoadState&, const model::Reference&) {
+/// The values that the conditions of a stage compare.
+struct Seen {
+  const model::Measurement& state;
+  const model::Reference& reference;
+  const std::optional<CableEnd>& end;
+
+  /// A signal of the plant; NaN, with which no comparison holds, if the sample lacks it.
+  double signal(Eigen::Index place) const {
+    return place < state.signals.size() ? state.signals[place]
+                                        : std::numeric_limits<double>::quiet_NaN();
+  }
+};
+
+bool holds(const config::LeaveUntil& leave, const Seen& seen) {
+  using Condition = config::LeaveUntil::Condition;
+  using Signal = model::SharedLoad::Signal;
+  switch (leave.condition) {
+    case Condition::kWithin: {
+      const bool is_load = leave.body == config::Body::kLoad;
+      const Eigen::Vector3d& body = is_load ? seen.state.p_WL : seen.state.p_WQ;
+      const Eigen::Vector3d target = seen.reference.position + leave.offset;
+      return (body - target).norm() < leave.radius_m;
+    }
+    case Condition::kCable:
+      return seen.signal(Signal::kTaut) == (leave.cable == config::CableState::kTaut ? 1.0 : 0.0);
+    case Condition::kLoad:
+      return seen.signal(seen.end.value().on_ground.value()) ==
+             (leave.load == config::LoadPlace::kOnGround ? 1.0 : 0.0);
+    case Condition::kTensionAbove:
+      return seen.signal(Signal::kTension) > leave.tension_n;
+    case Condition::kTensionBelow:
+      return seen.signal(Signal::kTension) < leave.tension_n;
+  }
+  return false;
+}
+
+StageOutcome judge(const config::LeaveAfter& leave, std::int64_t elapsed_ns, const Seen&) {
   return elapsed_ns >= leave.duration_ns ? StageOutcome::kLeft : StageOutcome::kGoesOn;
 }
 
-StageOutcome judge(const config::LeaveWithin& leave, std::int64_t elapsed_ns,
-                   const model::SlungLoadState& state, const model::Reference& reference) {
-  const Eigen::Vector3d& body = leave.body == config::Body::kLoad ? state.p_WL : state.p_WQ;
-  const Eigen::Vector3d target = reference.position + leave.offset;
-  if (elapsed_ns > leave.after_ns && (body - target).norm() < leave.radius_m) {
-    return StageOutcome::kLeft;
-  }
+StageOutcome judge(const config::LeaveUntil& leave, std::int64_t elapsed_ns, const Seen& seen) {
+  if (elapsed_ns > leave.after_ns && holds(leave, seen)) return StageOutcome::kLeft;
   return elapsed_ns >= leave.timeout_ns ? StageOutcome::kTimedOut : StageOutcome::kGoesOn;
 }
 
@@ -62,7 +92,7 @@ void Mission::calc_reference(const Stage& stage, double time, MissionProgress& p
         calc_end_reference(progress.load_reference, progress.load_attitude, end_->attachment_L);
 }
 
-MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoadState& state,
+MissionProgress Mission::calc_progress(std::uint64_t step, const model::Measurement& state,
                                        const model::ControllerMemory& memory) const {
   const auto end = static_cast<std::uint32_t>(stages_.size());
   MissionProgress progress;
@@ -78,7 +108,9 @@ MissionProgress Mission::calc_progress(std::uint64_t step, const model::SlungLoa
     StageOutcome outcome = StageOutcome::kLeft;  // a finished mission stays finished
     if (memory.stage < end)
       outcome = std::visit(
-          [&](const auto& leave) { return judge(leave, elapsed_ns, state, progress.reference); },
+          [&](const auto& leave) {
+            return judge(leave, elapsed_ns, {state, progress.reference, end_});
+          },
           stage.leave);
     if (outcome == StageOutcome::kGoesOn) return progress;
     if (outcome == StageOutcome::kTimedOut) {

@@ -10,8 +10,8 @@
 
 #include "common/config/scenario.hpp"
 #include "common/model/answer.hpp"
+#include "common/model/measurement.hpp"
 #include "common/model/reference.hpp"
-#include "common/model/state.hpp"
 #include "control_client/reference_trajectory.hpp"
 
 namespace sls::control {
@@ -30,8 +30,9 @@ struct MissionProgress {
 
 /// The end of a vehicle's own cable at a load that several vehicles carry.
 struct CableEnd {
-  Eigen::Quaterniond q_WL;       ///< attitude of the load at step 0
-  Eigen::Vector3d attachment_L;  ///< in the load, from its centre of mass, m
+  Eigen::Quaterniond q_WL;                     ///< attitude of the load at step 0
+  Eigen::Vector3d attachment_L;                ///< in the load, from its centre of mass, m
+  std::optional<Eigen::Index> on_ground = {};  ///< the signal, of plants with a ground
 };
 
 class Mission {
@@ -47,7 +48,7 @@ class Mission {
   /// Progress at `step`, from the memory accepted one step before, which must be possible at
   /// `step`. A finished mission stays finished, even if the body leaves the last stage's radius
   /// again. The mission fails when a stage reaches its timeout.
-  MissionProgress calc_progress(std::uint64_t step, const model::SlungLoadState& state,
+  MissionProgress calc_progress(std::uint64_t step, const model::Measurement& state,
                                 const model::ControllerMemory& memory) const;
 
   const std::string& stage_name(std::uint32_t stage) const { return stages_[stage].name; }

@@ -90,7 +90,7 @@ void check_times(const Scenario& scenario, const Places& places) {
                                to_mismatch("multiple", "sync.period_s", period, leave.duration_ns));
   }
   for (std::size_t i = 0; i < scenario.mission.size(); ++i) {
-    const auto* leave = std::get_if<LeaveWithin>(&scenario.mission[i].leave);
+    const auto* leave = std::get_if<LeaveUntil>(&scenario.mission[i].leave);
     if (leave && leave->timeout_ns <= leave->after_ns)
       throw places.make_error_at(to_stage_path(i) + ".until.timeout_s",
                                  "expected > after_s (" + to_seconds_text(leave->after_ns) +
@@ -203,7 +203,7 @@ std::int64_t calc_longest_flight_ns(const Scenario& scenario) {
   std::int64_t sum = 0;
   for (const Stage& stage : scenario.mission) {
     const auto* timed = std::get_if<LeaveAfter>(&stage.leave);
-    sum += timed ? timed->duration_ns : std::get<LeaveWithin>(stage.leave).timeout_ns;
+    sum += timed ? timed->duration_ns : std::get<LeaveUntil>(stage.leave).timeout_ns;
   }
   return sum;
 }
@@ -241,6 +241,22 @@ void check_attitudes(const Scenario& scenario, const Places& places) {
       if (places.has(path))
         throw places.make_error_at(
             path, "of a load that is a rigid body and hangs on cables (plant.load_inertia_kg_m2)");
+    }
+}
+
+/// Conditions on cable and load need a plant that has cables, and those on the ground a ground.
+void check_conditions(const Scenario& scenario, const Places& places) {
+  const auto& load = scenario.shared_load;
+  for (std::size_t i = 0; i < scenario.mission.size(); ++i)
+    for (const char* key : {"cable", "tension_above_n", "tension_below_n", "load"}) {
+      const std::string path = to_stage_path(i) + ".until." + key;
+      if (!places.has(path)) continue;
+      if (!load)
+        throw places.make_error_at(path,
+                                   "of a load on cables (plant.model 'cables'), here it is '" +
+                                       scenario.plant.model.name + "'");
+      if (std::string_view(key) == "load" && !load->on_ground)
+        throw places.make_error_at(path, "of a plant with a ground (plant.ground_z_m)");
     }
 }
 
@@ -316,6 +332,7 @@ Scenario read_scenario(const YamlNode& root, const std::string& place, const std
   plant.check(scenario, places);
   scenario.shared_load = plant.calc_shared_load(scenario);
   check_attitudes(scenario, places);
+  check_conditions(scenario, places);
   find_model_keys(places.models().laws, scenario.controller.law).check(scenario, places);
   scenario.text = text;
   scenario.sha256 = calc_sha256(text);

@@ -330,17 +330,33 @@ struct LeaveAfter {
   std::int64_t duration_ns = 0;
 };
 
-/// The stage ends at the first step later than `after` at which the body is within the radius of
-/// the reference position plus `offset`; the mission fails if that has not happened by `timeout`.
-struct LeaveWithin {
+enum class CableState { kTaut, kSlack };
+enum class LoadPlace { kOnGround, kOffGround };
+
+/// The stage ends at the first step later than `after` at which its condition holds; the mission
+/// fails if that has not happened by `timeout`.
+struct LeaveUntil {
+  enum class Condition { kWithin, kCable, kLoad, kTensionAbove, kTensionBelow };
+
+  Condition condition = Condition::kWithin;
   std::int64_t after_ns = 0;
+  /// kWithin: the body is within the radius of the reference position plus `offset`.
   double radius_m = 0.2;
   Body body = Body::kLoad;
   Eigen::Vector3d offset = Eigen::Vector3d::Zero();  ///< m
+  CableState cable = CableState::kTaut;              ///< kCable: state of the own cable
+  LoadPlace load = LoadPlace::kOnGround;             ///< kLoad
+  double tension_n = 0.0;  ///< kTensionAbove, kTensionBelow: that of the own cable
   std::int64_t timeout_ns = 0;
 };
 
-using LeaveCondition = std::variant<LeaveAfter, LeaveWithin>;
+using LeaveCondition = std::variant<LeaveAfter, LeaveUntil>;
+
+/// Least duration of a stage, ns.
+inline std::int64_t find_least_duration_ns(const LeaveCondition& leave) {
+  const auto* timed = std::get_if<LeaveAfter>(&leave);
+  return timed ? timed->duration_ns : std::get<LeaveUntil>(leave).after_ns;
+}
 
 struct Stage {
   std::string kind;  ///< the YAML key: hold, set_point, figure_eight, rest_to_rest

@@ -130,6 +130,12 @@ inline std::array<Name<RecordFormat>, 2> names_of(RecordFormat) {
 inline std::array<Name<Body>, 2> names_of(Body) {
   return {{{"load", Body::kLoad}, {"quadrotor", Body::kQuadrotor}}};
 }
+inline std::array<Name<CableState>, 2> names_of(CableState) {
+  return {{{"taut", CableState::kTaut}, {"slack", CableState::kSlack}}};
+}
+inline std::array<Name<LoadPlace>, 2> names_of(LoadPlace) {
+  return {{{"on_ground", LoadPlace::kOnGround}, {"off_ground", LoadPlace::kOffGround}}};
+}
 
 /// One alternative of a choice and the keys that belong to it alone.
 template <class Choice>
@@ -318,12 +324,28 @@ void describe(Map& map, RestToRestReference& reference) {
 }
 
 template <class Map>
-void describe(Map& map, LeaveWithin& leave) {
+void describe(Map& map, LeaveUntil& leave) {
   constexpr std::int64_t kPatience = 60'000'000'000;  // ns
-  map.key(kRequired, "within_m", leave.radius_m, kPositive);
+  using Condition = LeaveUntil::Condition;
+  map.choose(leave.condition, {{Condition::kWithin, {"within_m", "of", "offset_m"}},
+                               {Condition::kCable, {"cable"}},
+                               {Condition::kLoad, {"load"}},
+                               {Condition::kTensionAbove, {"tension_above_n"}},
+                               {Condition::kTensionBelow, {"tension_below_n"}}});
+  if (leave.condition == Condition::kWithin) {
+    map.key(kRequired, "within_m", leave.radius_m, kPositive);
+    map.key(kOptional, "of", leave.body);
+    map.key(kOptional, "offset_m", leave.offset);
+  } else if (leave.condition == Condition::kCable) {
+    map.key(kRequired, "cable", leave.cable);
+  } else if (leave.condition == Condition::kLoad) {
+    map.key(kRequired, "load", leave.load);
+  } else if (leave.condition == Condition::kTensionAbove) {
+    map.key(kRequired, "tension_above_n", leave.tension_n, kNotNegative);
+  } else {
+    map.key(kRequired, "tension_below_n", leave.tension_n, kPositive);
+  }
   map.key(kOptional, "after_s", leave.after_ns, kNotNegative);
-  map.key(kOptional, "of", leave.body);
-  map.key(kOptional, "offset_m", leave.offset);
   map.by_default(leave.timeout_ns, std::min(leave.after_ns + kPatience, kMaxNanoseconds));
   map.key(kOptional, "timeout_s", leave.timeout_ns, kPositive);
 }
@@ -349,7 +371,7 @@ void describe(Map& map, Stage& stage) {
   if (timed)
     map.key(kRequired, "for_s", as<LeaveAfter>(stage.leave).duration_ns, kPositive);
   else
-    map.key(kRequired, "until", as<LeaveWithin>(stage.leave));
+    map.key(kRequired, "until", as<LeaveUntil>(stage.leave));
 }
 
 // --- sensing -------------------------------------------------------------------------------------

@@ -26,6 +26,8 @@ struct SharedLoad {
   std::optional<Eigen::Matrix3d> inertia_L;  ///< about the centre of mass, kg·m²; none: a point
   Eigen::Quaterniond q_WL = Eigen::Quaterniond::Identity();  ///< at step 0
   std::vector<Cable> cables;                                 ///< of each vehicle
+  /// Further signals, if the plant has them: 1 if the own cable is cut, and if the load stands.
+  std::optional<Eigen::Index> released, on_ground;
 };
 
 /// The desired attitude of a shared load. It turns about one axis, which is fixed in the load and

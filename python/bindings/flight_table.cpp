@@ -95,10 +95,7 @@ void read_attitude(Reader& row, model::Attitude& attitude) {
 std::size_t estimate_steps(const config::Scenario& scenario) {
   std::int64_t duration_ns = 0;
   for (const config::Stage& stage : scenario.mission)
-    if (const auto* after = std::get_if<config::LeaveAfter>(&stage.leave))
-      duration_ns += after->duration_ns;
-    else
-      duration_ns += std::get<config::LeaveWithin>(stage.leave).after_ns;
+    duration_ns += config::find_least_duration_ns(stage.leave);
   // The bound avoids a huge reservation for a very long mission: rows grow when they are needed.
   return static_cast<std::size_t>(
       std::min<std::int64_t>(duration_ns / scenario.sync.period_ns + 1, 1'000'000));

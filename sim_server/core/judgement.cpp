@@ -14,12 +14,6 @@ using model::MissionPhase;
 
 double calc_norm(const Eigen::Vector3d& f) { return std::hypot(f.x(), f.y(), f.z()); }
 
-/// Least duration of a stage, ns.
-std::int64_t find_least_duration(const config::LeaveCondition& leave) {
-  const auto* timed = std::get_if<config::LeaveAfter>(&leave);
-  return timed ? timed->duration_ns : std::get<config::LeaveWithin>(leave).after_ns;
-}
-
 /// True if no number is infinite or NaN: the product of such a number with zero is NaN.
 bool is_finite(const model::Reference& reference) {
   double sum = 0.0;
@@ -46,7 +40,7 @@ AnswerLimits make_answer_limits(const config::Scenario& scenario) {
   limits.stages = static_cast<std::uint32_t>(scenario.mission.size());
   const std::int64_t period = scenario.sync.period_ns;
   for (const config::Stage& stage : scenario.mission) {
-    const std::int64_t least = find_least_duration(stage.leave);
+    const std::int64_t least = config::find_least_duration_ns(stage.leave);
     // A stage ends at a step: at the first one that is not before its least duration.
     limits.earliest_end += static_cast<std::uint64_t>(least / period + (least % period != 0));
   }

@@ -146,7 +146,7 @@ TEST(FlightTest, FailsWhereTheServerEndsTheRun) {
                                            "fault: free_fall"));
 
   config::Scenario late = load("short");
-  config::LeaveWithin never;
+  config::LeaveUntil never;
   never.radius_m = 1e-9;
   never.timeout_ns = 400'000'000;
   late.mission[0].leave = never;

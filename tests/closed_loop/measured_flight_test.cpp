@@ -327,7 +327,7 @@ TEST(MeasuredFlightTest, LosesTheLoadByTheRuleOfTheDelayMargin) {
 TEST(MeasuredFlightTest, SaysWhyAndWhenAFlightFails) {
   const config::Scenario base = load("short");
   config::Scenario late = base;
-  config::LeaveWithin never;
+  config::LeaveUntil never;
   never.radius_m = 1e-9;
   never.timeout_ns = 400'000'000;
   late.mission[0].leave = never;

@@ -280,7 +280,7 @@ TEST(FlightControllerTest, AMemoryThatCannotBeIsAFaultNotACrash) {
 TEST(FlightControllerTest, AStageThatTimesOutFailsTheMission) {
   config::Scenario scenario = make_figure_eight();
   config::Stage stage = make_hold({0.0, 0.0, -0.5}, 0);
-  config::LeaveWithin leave;
+  config::LeaveUntil leave;
   leave.after_ns = kSecond;
   leave.timeout_ns = 2 * kSecond;
   stage.leave = leave;
@@ -297,7 +297,7 @@ TEST(FlightControllerTest, RadiusStagesUseTheTrueLoadNotTheModels) {
   config::Scenario scenario = make_figure_eight();
   scenario.vehicle.rod_length = 1.5;  // the controller's model has 1.0
   config::Stage stage = make_hold({0.0, 0.0, -1.0}, 0);
-  config::LeaveWithin leave;
+  config::LeaveUntil leave;
   leave.radius_m = 0.1;
   leave.timeout_ns = 100 * kSecond;
   stage.leave = leave;

@@ -23,7 +23,7 @@ model::SlungLoadState make_state_at(const Vector3d& p_WQ, const Vector3d& p_WL) 
   return state;
 }
 
-config::Stage make_within(const config::LeaveWithin& leave, const Vector3d& position) {
+config::Stage make_within(const config::LeaveUntil& leave, const Vector3d& position) {
   config::Stage stage;
   stage.kind = stage.name = "set_point";
   stage.reference = config::ConstantReference{position};
@@ -107,7 +107,7 @@ TEST(MissionTest, TheLastStageStaysInForceWhenTheMissionFinishes) {
 }
 
 TEST(MissionTest, ARadiusStageIsLeftStrictlyAfterAndStrictlyWithin) {
-  config::LeaveWithin leave;
+  config::LeaveUntil leave;
   leave.after_ns = 1 * kSecond;
   leave.radius_m = 0.25;  // exact in binary
   leave.timeout_ns = 10 * kSecond;
@@ -120,8 +120,57 @@ TEST(MissionTest, ARadiusStageIsLeftStrictlyAfterAndStrictlyWithin) {
   EXPECT_EQ(mission.calc_progress(251, on_the_sphere, {}).phase, MissionPhase::kRunning);
 }
 
+TEST(MissionTest, AStageEndsByCableLoadAndTension) {
+  using Condition = config::LeaveUntil::Condition;
+  struct Case {
+    Condition condition;
+    config::CableState cable;
+    config::LoadPlace load;
+    std::vector<double> ends, stays;  // tension, taut, load on the ground
+  };
+  using config::CableState, config::LoadPlace;
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const Case cases[] = {
+      {Condition::kCable, CableState::kTaut, {}, {0, 1, 0}, {9, 0, 1}},
+      {Condition::kCable, CableState::kSlack, {}, {9, 0, 1}, {0, 1, 0}},
+      {Condition::kLoad, {}, LoadPlace::kOnGround, {9, 0, 1}, {0, 1, 0}},
+      {Condition::kLoad, {}, LoadPlace::kOffGround, {0, 1, 0}, {9, 0, 1}},
+      {Condition::kTensionAbove, {}, {}, {1.5000001, 0, 1}, {1.5, 1, 0}},
+      {Condition::kTensionBelow, {}, {}, {1.4999999, 0, 1}, {1.5, 1, 0}},
+  };
+  constexpr Eigen::Index kOnGround = 11;
+  const auto see = [&](const std::vector<double>& seen) {
+    model::Measurement state;
+    state.signals.setZero(kOnGround + 1);
+    state.signals[model::SharedLoad::kTension] = seen[0];
+    state.signals[model::SharedLoad::kTaut] = seen[1];
+    state.signals[kOnGround] = seen[2];
+    return state;
+  };
+  for (const Case& a : cases) {
+    config::LeaveUntil leave;
+    leave.condition = a.condition;
+    leave.cable = a.cable;
+    leave.load = a.load;
+    leave.tension_n = 1.5;
+    leave.after_ns = 1 * kSecond;
+    leave.timeout_ns = 2 * kSecond;
+    const Mission mission({make_within(leave, {1, 0, -2})}, kPeriod,
+                          CableEnd{Eigen::Quaterniond::Identity(), {0, 0, 0}, kOnGround});
+    const auto phase = [&](std::uint64_t step, const model::Measurement& state) {
+      return mission.calc_progress(step, state, {}).phase;
+    };
+    EXPECT_EQ(phase(250, see(a.ends)), MissionPhase::kRunning);
+    EXPECT_EQ(phase(251, see(a.ends)), MissionPhase::kFinished);
+    EXPECT_EQ(phase(499, see(a.stays)), MissionPhase::kRunning);
+    EXPECT_EQ(phase(500, see(a.stays)), MissionPhase::kFailed);
+    EXPECT_EQ(phase(251, {}), MissionPhase::kRunning) << "a sample without signals";
+    EXPECT_EQ(phase(251, see({nan, nan, nan})), MissionPhase::kRunning);
+  }
+}
+
 TEST(MissionTest, AFinishedMissionStaysFinishedWhereverTheBodyGoes) {
-  config::LeaveWithin leave;
+  config::LeaveUntil leave;
   leave.radius_m = 0.25;
   leave.timeout_ns = 10 * kSecond;
   const Mission mission({make_hold({0, 0, -1}, 1 * kSecond), make_within(leave, {1, 0, -2})},
@@ -146,7 +195,7 @@ TEST(MissionTest, AFinishedMissionStaysFinishedWhereverTheBodyGoes) {
 }
 
 TEST(MissionTest, ARadiusMayBeAroundTheQuadrotorWithAnOffset) {
-  config::LeaveWithin leave;
+  config::LeaveUntil leave;
   leave.after_ns = 15 * kSecond;
   leave.radius_m = 0.2;
   leave.body = config::Body::kQuadrotor;
@@ -165,7 +214,7 @@ TEST(MissionTest, ARadiusMayBeAroundTheQuadrotorWithAnOffset) {
 
 TEST(MissionTest, TheRadiusFollowsAMovingReference) {
   config::Stage stage = make_figure_eight_stage(-0.5);
-  config::LeaveWithin leave;
+  config::LeaveUntil leave;
   leave.timeout_ns = 100 * kSecond;
   stage.leave = leave;
   const Mission mission({stage}, kPeriod);
@@ -178,7 +227,7 @@ TEST(MissionTest, TheRadiusFollowsAMovingReference) {
 }
 
 TEST(MissionTest, AStageWhoseRadiusIsNotReachedInTimeFails) {
-  config::LeaveWithin leave;
+  config::LeaveUntil leave;
   leave.after_ns = 1 * kSecond;
   leave.timeout_ns = 2 * kSecond;
   const Mission mission({make_within(leave, {1, 0, -2}), make_hold({0, 0, 0}, kSecond)}, kPeriod);
@@ -195,7 +244,7 @@ TEST(MissionTest, AStageWhoseRadiusIsNotReachedInTimeFails) {
 
 TEST(MissionTest, MixedStagesSwitchAtTheStepTheyShould) {
   // hold 1 s, then a point that the load reaches at step 700, then hold 1 s.
-  config::LeaveWithin leave;
+  config::LeaveUntil leave;
   leave.after_ns = 1 * kSecond;
   leave.timeout_ns = 60 * kSecond;
   const Mission mission({make_hold({0, 0, -1}, 1 * kSecond), make_within(leave, {1, 0, -2}),

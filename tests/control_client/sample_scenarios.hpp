@@ -77,7 +77,7 @@ inline config::Scenario make_gazebo_legacy(config::StateWiring wiring) {
   gains.horizontal.velocity = 9.7962;
   gains.horizontal.position = 5.4399;
   scenario.controller.own = QsfKeys{gains};
-  config::LeaveWithin arrival;
+  config::LeaveUntil arrival;
   arrival.after_ns = 15 * kSecond;
   arrival.radius_m = 0.2;
   arrival.body = config::Body::kQuadrotor;

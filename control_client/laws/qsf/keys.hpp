@@ -1,6 +1,7 @@
 /// The scenario keys of the law `qsf`.
 #pragma once
 
+#include <optional>
 #include <variant>
 
 #include "common/config/scenario_keys.hpp"
@@ -62,14 +63,15 @@ void describe(Map& map, Gains& gains) {
   }
 }
 
-/// The values of `gains`.
 struct QsfKeys {
   Gains gains = LqrWeights{};
+  std::optional<double> retaut_rate = {};  ///< m/s; none: no rule for slack cables
 };
 
 template <class Map>
 void describe_own(Map& map, config::Controller&, QsfKeys& keys) {
   map.key(config::kOptional, "gains", keys.gains);
+  map.key(config::kOptional, "retaut_rate_m_s", keys.retaut_rate, config::kPositive);
 }
 
 }  // namespace sls::control

@@ -83,7 +83,7 @@ QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehi
   const VerticalMotion z = calc_vertical(input, e, e_dot, gains.vertical);
   const double s = vehicle.gravity - z.n;
   if (!std::isfinite(s)) return fail(ErrorCode::kNotFinite);
-  if (s < kMinSupportFraction * vehicle.gravity) return fail(ErrorCode::kFreeFall);
+  if (s < input.least_support * vehicle.gravity) return fail(ErrorCode::kFreeFall);
 
   // Eq. (5): the rod's slope determines the horizontal acceleration and jerk of the load.
   const Vector2d w = q.head<2>() / q.z();
@@ -106,15 +106,30 @@ QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehi
 
 LawOutput QsfLaw::calc(const LawInput& input) const {
   const Vector3d integral = input.memory.head<3>();
-  const QsfOutput qsf =
-      calc_qsf({input.state.p_WQ, input.state.v_WQ, input.state.rod, input.reference, integral},
-               vehicle_, gains_);
+  QsfInput seen{input.state.p_WQ, input.state.v_WQ, input.state.rod, input.reference, integral};
+  const auto fly_slack = [&]() -> LawOutput {
+    return {slack_->calc_force(input.state, input.reference), input.memory, ErrorCode::kNone};
+  };
+  if (slack_) {
+    if (input.state.signals.size() < slack_->signals_size())
+      return without_force(LawOutput{{}, input.memory, {}}, ErrorCode::kNotFinite);
+    if (slack_->applies(input.state)) return fly_slack();
+    seen.least_support = SlackRule::kLeastSupport;
+  }
+  const QsfOutput qsf = calc_qsf(seen, vehicle_, gains_);
+  if (slack_ && qsf.error_code == ErrorCode::kFreeFall) return fly_slack();
   return {qsf.f_Q_W, calc_next_integral(integral, qsf.integral_rate, period_), qsf.error_code};
 }
 
 std::unique_ptr<const ControlLaw> make_qsf_law(const LawSetup& setup) {
-  const auto gains = make_named_gains(setup.controller.own.get<QsfKeys>().gains);
-  return std::make_unique<QsfLaw>(setup.controller.model.vehicle, gains, setup.period);
+  const auto& keys = setup.controller.own.get<QsfKeys>();
+  const NamedGains gains = make_named_gains(keys.gains);
+  const model::SlungLoadParameters& vehicle = setup.controller.model.vehicle;
+  std::optional<SlackRule> slack;
+  if (keys.retaut_rate && setup.shared_load)  // else no plant with such signals
+    slack.emplace(vehicle, gains.vertical, *keys.retaut_rate, setup.period,
+                  setup.shared_load->released);
+  return std::make_unique<QsfLaw>(vehicle, gains, setup.period, slack);
 }
 
 }  // namespace sls::control

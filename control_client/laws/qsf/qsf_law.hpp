@@ -2,9 +2,12 @@
 /// independent integrator chains. Source: README.md, eqs. (1)–(9).
 #pragma once
 
+#include <optional>
+
 #include "common/model/parameters.hpp"
 #include "control_client/laws/control_law.hpp"
 #include "control_client/laws/qsf/keys.hpp"
+#include "control_client/laws/qsf/slack.hpp"
 
 namespace sls::control {
 
@@ -15,6 +18,7 @@ struct QsfInput {
   model::RodAngles rod;                            ///< as wired to the controller's slots
   const model::Reference& reference;
   Eigen::Vector3d integral = Eigen::Vector3d::Zero();  ///< ∫e dt, m·s
+  double least_support = kMinSupportFraction;          ///< of g; below it s is free fall
 };
 
 struct QsfOutput {
@@ -31,11 +35,13 @@ struct QsfOutput {
 QsfOutput calc_qsf(const QsfInput& input, const model::SlungLoadParameters& vehicle,
                    const NamedGains& gains);
 
-/// The same as a `ControlLaw`. Its memory is the integral.
+/// The same as a `ControlLaw`. Its memory is the integral. `slack` flies where the cable is slack
+/// and where the law does not hold; without it these are errors.
 class QsfLaw : public ControlLaw {
  public:
-  QsfLaw(const model::SlungLoadParameters& vehicle, const NamedGains& gains, double period)
-      : vehicle_(vehicle), gains_(gains), period_(period) {}
+  QsfLaw(const model::SlungLoadParameters& vehicle, const NamedGains& gains, double period,
+         const std::optional<SlackRule>& slack = {})
+      : vehicle_(vehicle), gains_(gains), period_(period), slack_(slack) {}
 
   LawOutput calc(const LawInput& input) const override;
   int memory_size() const override { return 3; }
@@ -44,6 +50,7 @@ class QsfLaw : public ControlLaw {
   model::SlungLoadParameters vehicle_;
   NamedGains gains_;
   double period_;  // s
+  std::optional<SlackRule> slack_;
 };
 
 }  // namespace sls::control

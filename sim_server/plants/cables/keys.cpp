@@ -1,5 +1,7 @@
 #include "sim_server/plants/cables/keys.hpp"
 
+#include <algorithm>
+
 #include "common/config/own_keys.hpp"
 #include "sim_server/plants/cables/hybrid_motion.hpp"
 #include "sim_server/plants/cables/start.hpp"
@@ -152,6 +154,13 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
     model::SharedLoad load;
     if (keys.load_inertia) load.inertia_L = make_inertia(*keys.load_inertia, keys.load_products);
     load.q_WL = keys.load_attitude.value_or(load.q_WL);
+    const auto has = [&keys](auto member) {
+      return std::any_of(keys.cables.begin(), keys.cables.end(),
+                         [&](const CableKeys& cable) { return (cable.*member).has_value(); });
+    };
+    Eigen::Index place = model::SharedLoad::kSignals + (has(&CableKeys::winch) ? 1 : 0);
+    if (has(&CableKeys::release_ns)) load.released = place++;
+    if (keys.ground_z) load.on_ground = place;
     for (std::size_t i = 0; i < scenario.vehicles.size(); ++i)
       load.cables.push_back({scenario.vehicles[i].load_mass.value_or(scenario.vehicle.load_mass),
                              get_cable(keys, i).attachment});

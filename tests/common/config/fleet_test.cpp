@@ -83,7 +83,7 @@ TEST(FleetTest, EveryPlaceOfAVehicleMovesByItsOffset) {
   EXPECT_EQ(rest.from, Vector3d(10, -20, -0.5));
   EXPECT_EQ(rest.to, Vector3d(11, -20, -0.5));
   // The offset is relative to the reference, which moved with the vehicle.
-  EXPECT_EQ(std::get<LeaveWithin>(alone.mission[1].leave).offset, Vector3d(0, 0, 0.1));
+  EXPECT_EQ(std::get<LeaveUntil>(alone.mission[1].leave).offset, Vector3d(0, 0, 0.1));
 }
 
 TEST(FleetTest, AVehicleAloneKeepsNameTextHashAndFaults) {

@@ -190,7 +190,7 @@ TEST(ScenarioTest, ReadsEveryKeyOfTheMission) {
 
   EXPECT_EQ(mission[1].kind, "set_point");
   EXPECT_EQ(mission[1].name, "set_point");
-  const auto& within = std::get<LeaveWithin>(mission[1].leave);
+  const auto& within = std::get<LeaveUntil>(mission[1].leave);
   EXPECT_EQ(within.radius_m, 0.3);
   EXPECT_EQ(within.after_ns, 4'000'000'000);
   EXPECT_EQ(within.body, Body::kQuadrotor);
@@ -201,7 +201,7 @@ TEST(ScenarioTest, ReadsEveryKeyOfTheMission) {
   EXPECT_EQ(eight.amplitude, Vector3d(1, 2, 3));
   EXPECT_EQ(eight.offset, Vector3d(4, 5, 6));
   EXPECT_EQ(eight.period_s, 12.0);
-  const auto& by_default = std::get<LeaveWithin>(mission[2].leave);
+  const auto& by_default = std::get<LeaveUntil>(mission[2].leave);
   EXPECT_EQ(by_default.body, Body::kLoad);
   EXPECT_EQ(by_default.offset, Vector3d(0, 0, 0));
   EXPECT_EQ(by_default.timeout_ns, 65'000'000'000);
@@ -210,6 +210,37 @@ TEST(ScenarioTest, ReadsEveryKeyOfTheMission) {
   EXPECT_EQ(rest.from, Vector3d(1, 1, 1));
   EXPECT_EQ(rest.to, Vector3d(2, 2, 2));
   EXPECT_EQ(rest.duration_s, 3.0);
+}
+
+TEST(ScenarioTest, ReadsConditionsOnCableAndLoadAndWritesThem) {
+  const Scenario scenario = parse_scenario(R"(
+name: lift
+vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
+plant: { model: cables, cables: [{ distance_m: 1 }], ground_z_m: 0, initial: { load_position_m: [0, 0, 0] } }
+controller: { retaut_rate_m_s: 1.5 }
+mission:
+  - { hold: { position_m: [0, 0, 0] }, until: { cable: slack } }
+  - { hold: { position_m: [0, 0, 0] }, until: { load: off_ground, after_s: 2 } }
+  - { hold: { position_m: [0, 0, 0] }, until: { tension_above_n: 1.5 } }
+  - { hold: { position_m: [0, 0, 0] }, until: { tension_below_n: 0.5, timeout_s: 3 } }
+)",
+                                           "file");
+  using Condition = LeaveUntil::Condition;
+  const auto again = parse_scenario(to_yaml(scenario), "again").mission;
+  for (const auto& mission : {scenario.mission, again}) {
+    const auto at = [&](std::size_t i) { return std::get<LeaveUntil>(mission.at(i).leave); };
+    EXPECT_EQ(at(0).condition, Condition::kCable);
+    EXPECT_EQ(at(0).cable, CableState::kSlack);
+    EXPECT_EQ(at(0).timeout_ns, 60'000'000'000);
+    EXPECT_EQ(at(1).condition, Condition::kLoad);
+    EXPECT_EQ(at(1).load, LoadPlace::kOffGround);
+    EXPECT_EQ(at(1).after_ns, 2'000'000'000);
+    EXPECT_EQ(at(2).condition, Condition::kTensionAbove);
+    EXPECT_EQ(at(2).tension_n, 1.5);
+    EXPECT_EQ(at(3).condition, Condition::kTensionBelow);
+    EXPECT_EQ(at(3).tension_n, 0.5);
+    EXPECT_EQ(at(3).timeout_ns, 3'000'000'000);
+  }
 }
 
 TEST(ScenarioTest, ReadsEveryKeyOfTheFaults) {

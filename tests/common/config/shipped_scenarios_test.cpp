@@ -77,7 +77,7 @@ void expect_mission(const Scenario& scenario, double z, Body body, const Vector3
   expect_constant(mission[2], "set_point", {-2, -1, -4});
   expect_constant(mission[3], "set_point", {1, 2, -3});
   for (int i = 1; i <= 3; ++i) {
-    const auto* leave = std::get_if<LeaveWithin>(&mission[static_cast<std::size_t>(i)].leave);
+    const auto* leave = std::get_if<LeaveUntil>(&mission[static_cast<std::size_t>(i)].leave);
     ASSERT_NE(leave, nullptr);
     EXPECT_EQ(leave->after_ns, 15 * kSecond);
     EXPECT_EQ(leave->radius_m, 0.2);
@@ -92,7 +92,8 @@ void expect_mission(const Scenario& scenario, double z, Body body, const Vector3
 TEST(ShippedScenariosTest, AreThese) {
   std::set<std::string> names;
   for (const auto& file : list_yaml_files("config/scenarios")) names.insert(file.stem().string());
-  EXPECT_EQ(names, (std::set<std::string>{"cable_cut",
+  EXPECT_EQ(names, (std::set<std::string>{"aggressive_slack",
+                                          "cable_cut",
                                           "faulty_figure_eight",
                                           "figure_eight",
                                           "figure_eight_pid",
@@ -102,6 +103,7 @@ TEST(ShippedScenariosTest, AreThese) {
                                           "gazebo_corrected",
                                           "gazebo_legacy",
                                           "integral_mass_error",
+                                          "lift_and_set_down",
                                           "mass_error_without_integral",
                                           "matlab_figure_eight",
                                           "matlab_setpoint_1",
@@ -133,6 +135,7 @@ TEST(ShippedScenariosTest, AreThese) {
                                           "slack_drop",
                                           "three_carry_a_triangle",
                                           "three_carry_a_triangle_pose",
+                                          "two_carry_a_bar",
                                           "winch_down"}));
 }
 
@@ -335,7 +338,8 @@ TEST(ShippedScenariosTest, OnlyTheFleetsHaveMoreThanOneVehicle) {
                                                     {"rotors_carry_a_triangle", 3},
                                                     {"six_carry_a_box", 6},
                                                     {"three_carry_a_triangle", 3},
-                                                    {"three_carry_a_triangle_pose", 3}};
+                                                    {"three_carry_a_triangle_pose", 3},
+                                                    {"two_carry_a_bar", 2}};
     const auto fleet = fleets.find(scenario.name);
     EXPECT_EQ(scenario.vehicles.size(), fleet == fleets.end() ? 1 : fleet->second) << file;
     if (scenario.plant.model.name == "cables") continue;  // whose offsets are attachments

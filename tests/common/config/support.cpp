@@ -95,8 +95,10 @@ bool are_equal(const LeaveCondition& a, const LeaveCondition& b) {
   if (a.index() != b.index()) return false;
   if (const auto* timed = std::get_if<LeaveAfter>(&a))
     return timed->duration_ns == std::get<LeaveAfter>(b).duration_ns;
-  const auto &within = std::get<LeaveWithin>(a), &other = std::get<LeaveWithin>(b);
-  return within.after_ns == other.after_ns && within.radius_m == other.radius_m &&
+  const auto &within = std::get<LeaveUntil>(a), &other = std::get<LeaveUntil>(b);
+  return within.condition == other.condition && within.cable == other.cable &&
+         within.load == other.load && within.tension_n == other.tension_n &&
+         within.after_ns == other.after_ns && within.radius_m == other.radius_m &&
          within.body == other.body && within.offset == other.offset &&
          within.timeout_ns == other.timeout_ns;
 }
@@ -262,7 +264,7 @@ Stage make_random_stage(Dice& dice, std::int64_t period_ns) {
   if (dice.toss()) {
     stage.leave = LeaveAfter{period_ns * dice.nanoseconds(1, 1'000'000)};
   } else {
-    LeaveWithin leave;
+    LeaveUntil leave;
     leave.after_ns = dice.toss() ? 0 : dice.nanoseconds(1, 400'000'000'000'000);
     leave.radius_m = dice.positive();
     leave.body = dice.toss() ? Body::kLoad : Body::kQuadrotor;

@@ -28,8 +28,8 @@ std::uint64_t calc_earliest_end(std::int64_t period_ns,
   return make_answer_limits(make_scenario(period_ns, leaves)).earliest_end;
 }
 
-config::LeaveWithin make_within(std::int64_t after_ns) {
-  config::LeaveWithin leave;
+config::LeaveUntil make_within(std::int64_t after_ns) {
+  config::LeaveUntil leave;
   leave.after_ns = after_ns;
   leave.radius_m = 1e3;
   leave.timeout_ns = after_ns + 1'000'000'000;
