@@ -26,6 +26,7 @@ struct SharedLoad {
   std::optional<Eigen::Matrix3d> inertia_L;  ///< about the centre of mass, kg·m²; none: a point
   Eigen::Quaterniond q_WL = Eigen::Quaterniond::Identity();  ///< at step 0
   std::vector<Cable> cables;                                 ///< of each vehicle
+  std::optional<double> ground_z_W;                          ///< m; none: no ground
 };
 
 /// The desired attitude of a shared load. It turns about one axis, which is fixed in the load and

@@ -100,6 +100,7 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
     model::SharedLoad load;
     if (keys.load_inertia) load.inertia_L = make_inertia(*keys.load_inertia, keys.load_products);
     load.q_WL = keys.load_attitude.value_or(load.q_WL);
+    load.ground_z_W = keys.ground_z;
     for (std::size_t i = 0; i < scenario.vehicles.size(); ++i)
       load.cables.push_back({scenario.vehicles[i].load_mass.value_or(scenario.vehicle.load_mass),
                              get_cable(keys, i).attachment});
