@@ -14,6 +14,7 @@ using Points = std::vector<Eigen::Vector3d>;
 
 /// The points in turn around their mean, in the plane that fits them best.
 Points sort_around(Points points) {
+  if (points.size() < 3) return points;
   const auto count = static_cast<Eigen::Index>(points.size());
   Eigen::Matrix3Xd offsets(3, count);
   for (Eigen::Index i = 0; i < count; ++i) offsets.col(i) = points[static_cast<std::size_t>(i)];
@@ -111,7 +112,10 @@ Points calc_hanging_points(const Eigen::Vector3d& from, const Eigen::Vector3d& t
   const double x_0 = 0.5 * width - a * std::atanh(rise / length);
   const double s_0 = -a * std::sinh(x_0 / a);  // at `from`
   constexpr int kParts = kHangingPoints - 1;
-  const double lowest = std::round(-s_0 / length * kParts);  // the number of the nearest point
+  // The point next to the lowest one is moved there, if it is between the ends.
+  const double place = -s_0 / length * kParts;
+  const double lowest =
+      place > 0.0 && place < kParts ? std::clamp(std::round(place), 1.0, kParts - 1.0) : 0.0;
   Points points = {from};
   for (int i = 1; i < kParts; ++i) {
     const double s = i == lowest ? 0.0 : s_0 + length * i / kParts;

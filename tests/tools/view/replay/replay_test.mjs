@@ -164,8 +164,9 @@ test("one load is drawn at its centre, and its cables are taut, hang slack or ar
   const metre = camera.area.height / camera.height_m;
   const pixel = [camera.area.left + camera.area.width / 2 + (centre[1] - camera.target_m[1]) * metre,
     camera.area.top + camera.area.height / 2 - (centre[0] - camera.target_m[0]) * metre];
-  const colour = await readPixel(cut.page, pixel);
-  assert.ok(isNear(colour, [0xe0, 0x86, 0x00], 8), `the load at its centre, got ${colour}`);
+  const seen = []; // below a rotor, whose disc is faint; a blade may cross some of these places
+  for (const off of [-3, 0, 3]) seen.push(await readPixel(cut.page, [pixel[0] + off, pixel[1] + off]));
+  assert.ok(seen.some((colour) => isNear(colour, [0xe0, 0x86, 0x00], 30)), `the load at its centre, got ${seen.join("  ")}`);
   assert.deepEqual(cut.problems, []);
   await cut.page.close();
 });

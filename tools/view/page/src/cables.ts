@@ -37,7 +37,8 @@ export function calcHangingPoints(from: Vector3, to: Vector3, length: number): V
   const a = (0.5 * width) / invertSinhRatio(ratio);
   const x0 = 0.5 * width - a * Math.atanh(along.z / length);
   const s0 = -a * Math.sinh(x0 / a);
-  const lowest = Math.round((-s0 / length) * kCableParts);
+  const place = (-s0 / length) * kCableParts; // of the lowest point: the point next to it is moved there
+  const lowest = place > 0 && place < kCableParts ? Math.min(Math.max(Math.round(place), 1), kCableParts - 1) : 0;
   const points = [from.clone()];
   for (let i = 1; i < kCableParts; ++i) {
     const s = i === lowest ? 0 : s0 + (length * i) / kCableParts;
