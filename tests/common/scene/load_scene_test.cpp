@@ -23,9 +23,9 @@ double calc_length(const Points& points) {
 }
 
 double find_lowest(const Points& points) {
-  return std::max_element(points.begin(), points.end(), [](const auto& a, const auto& b) {
-           return a.z() < b.z();
-         })->z();  // z is down
+  return std::max_element(points.begin(), points.end(),
+                          [](const auto& a, const auto& b) { return a.z() < b.z(); })
+      ->z();  // z is down
 }
 
 /// Of a symmetric catenary with the parameter a over the width h: L = 2 a sinh(h / 2a), and its sag

@@ -87,8 +87,8 @@ faults:
 }
 
 TEST_F(McapFlightTest, OneLoadIsDrawnOnceWithItsAttitudeAndCablesThatAreTautSlackOrCut) {
-  const fs::path cut = fly(make_file("cable_cut", "", {{"release_s: 8", "release_s: 1"},
-                                                       {"for_s: 22", "for_s: 1"}}));
+  const fs::path cut = fly(
+      make_file("cable_cut", "", {{"release_s: 8", "release_s: 1"}, {"for_s: 22", "for_s: 1"}}));
   const auto cables = judge(cut).at("cables");
   EXPECT_GT(cables.at("taut"), 160);  // 20 a second and vehicle
   EXPECT_GT(cables.at("cut"), 30);

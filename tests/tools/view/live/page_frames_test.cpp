@@ -77,8 +77,7 @@ TEST(PageFramesTest, PosesOfALoadOnCablesHaveTheirSignals) {
   frames.add(make_sample(batch));
   ASSERT_TRUE(frames.decode());
   const auto poses = test::read_poses(frames.make_poses(), true);
-  EXPECT_EQ(poses.vehicles.at(0).cable,
-            (std::vector<float>{2.5, 1.5, 1, 0.5, -0.5, 0.5, -0.5, 1}));
+  EXPECT_EQ(poses.vehicles.at(0).cable, (std::vector<float>{2.5, 1.5, 1, 0.5, -0.5, 0.5, -0.5, 1}));
 }
 
 TEST(PageFramesTest, AFleetWhoseStepIsSpreadOverBatchesIsWhole) {
