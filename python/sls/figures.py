@@ -409,6 +409,8 @@ def plot_cables(flights: Sequence[Trajectory]) -> Figure:
     """Tension and length of each cable, and when it is slack or cut."""
     flights = [flight for flight in flights if flight.cable]
     figure, axes = make_stack(3, "Cables", ("tension (N)", "length (m)", "cable"), height=1.55)
+    if not flights:
+        return figure
     for index, flight in enumerate(flights):
         style = style_of(index, flights)
         draw(axes[0, 0], flight.time_s, flight.cable.tension, label=flight.name, **style)
