@@ -276,9 +276,10 @@ function expectCables(messages, vehicleIds) {
       const ends = ["quad_", "load_"].map((name) => xyz(row, name, "_m")).map(([x, y, z]) => [x, -y, -z]);
       expect(near(points[0], ends[0]) && near(points.at(-1), ends[1]), `cable at ${time}: ends`);
       const length = points.slice(1).reduce((sum, point, i) => sum + Math.hypot(...point.map((p, axis) => p - points[i][axis])), 0);
-      // A curve in 24 parts is a little shorter.
+      // A curve in 24 parts is a little shorter; one that lies on the ground is drawn without its folds.
       const ratio = length / Number(row.cable_length_m);
-      if (state !== "cut") expect(ratio < 1 + 1e-6 && ratio > 0.995, `cable at ${time}: length ${length}`);
+      const mayLie = state === "slack" && "load_on_ground" in row;
+      if (state !== "cut" && !mayLie) expect(ratio < 1 + 1e-6 && ratio > 0.995, `cable at ${time}: length ${length}`);
       const hasLoad = value.markers.some((marker) => marker.id === 2);
       expectEqual(hasLoad, id === Math.min(...vehicleIds), `load drawn with vehicle ${id}`);
     }
