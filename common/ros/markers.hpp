@@ -1,5 +1,6 @@
 /// The visualization_msgs/MarkerArray of one vehicle: body, rod, load, and trails of load and
-/// reference, all in the frame `world`.
+/// reference, all in the frame `world`. Instead of the rod a cable; then the load, its outline and
+/// the ground are those of the first vehicle.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,6 +11,7 @@
 
 #include "common/ros/cdr_writer.hpp"
 #include "common/ros/parts.hpp"
+#include "common/scene/load_scene.hpp"
 
 namespace sls::ros {
 
@@ -26,6 +28,11 @@ class Trail {
   std::vector<Eigen::Vector3d> points_;
 };
 
+struct LoadOnCable {
+  const scene::LoadScene& scene;
+  const scene::Cable& cable;
+};
+
 class VehicleMarkers {
  public:
   static constexpr std::int64_t kPeriodNs = 50'000'000;
@@ -35,11 +42,13 @@ class VehicleMarkers {
   /// True if the markers must be written now: once in each period of simulation time.
   bool is_due(std::int64_t sim_time_ns) const { return sim_time_ns >= next_ns_; }
 
-  /// Writes a MarkerArray. Positions in `world`.
+  /// Writes a MarkerArray. Positions in `world`; `load`: the end of the cable.
   void write(CdrWriter& cdr, std::int64_t sim_time_ns, const Pose& quadrotor,
-             const Eigen::Vector3d& load, const std::optional<Eigen::Vector3d>& reference);
+             const Eigen::Vector3d& load, const std::optional<Eigen::Vector3d>& reference,
+             const std::optional<LoadOnCable>& on_cable = {});
 
  private:
+  std::uint32_t vehicle_id_;
   std::string name_;
   std::int64_t next_ns_ = INT64_MIN;
   Trail load_trail_;

@@ -91,8 +91,8 @@ struct Mirrors::Impl {
     VehicleMarkers markers;
   };
 
-  explicit Impl(const std::vector<std::uint32_t>& vehicle_ids)
-      : channels(make_channels(vehicle_ids)) {
+  Impl(const std::vector<std::uint32_t>& vehicle_ids, std::optional<scene::LoadScene> load_scene)
+      : channels(make_channels(vehicle_ids)), scene(std::move(load_scene)) {
     for (const std::uint32_t id : vehicle_ids)
       vehicles.push_back({id, kRunChannels + vehicles.size() * kVehicleChannels,
                           name_quadrotor_frame(id), name_load_frame(id), VehicleMarkers(id)});
@@ -125,14 +125,22 @@ struct Mirrors::Impl {
     emit(kTf, time_ns, cdr.bytes());
   }
 
+  /// The cable of a vehicle of a run with a load on cables.
+  std::optional<scene::Cable> find_cable(const VehicleSample& sample) const {
+    if (!scene || scene->attachments_L.count(sample.vehicle_id) == 0) return std::nullopt;
+    return scene::read_cable(*scene, sample.signals);
+  }
+
   std::vector<Channel> channels;
+  std::optional<scene::LoadScene> scene;
   std::vector<Vehicle> vehicles;
   std::optional<std::uint64_t> last_clock_step;
   CdrWriter cdr;
 };
 
-Mirrors::Mirrors(const std::vector<std::uint32_t>& vehicle_ids)
-    : impl_(std::make_unique<Impl>(vehicle_ids)) {}
+Mirrors::Mirrors(const std::vector<std::uint32_t>& vehicle_ids,
+                 std::optional<scene::LoadScene> scene)
+    : impl_(std::make_unique<Impl>(vehicle_ids, std::move(scene))) {}
 Mirrors::~Mirrors() = default;
 
 const std::vector<Channel>& Mirrors::channels() const { return impl_->channels; }
@@ -150,10 +158,13 @@ void Mirrors::emit(const VehicleSample& sample, const Emit& emit) {
   CdrWriter& cdr = impl_->cdr;
   const std::int64_t time_ns = sample.sim_time_ns;
   const Pose quadrotor = {to_ros(sample.p_WQ), to_ros(sample.q_WB)};
-  const Pose load = {to_ros(sample.p_WL), Eigen::Quaterniond::Identity()};
+  const std::optional<scene::Cable> cable = impl_->find_cable(sample);
+  const Eigen::Quaterniond q_WL = cable ? cable->q_WL : Eigen::Quaterniond::Identity();
+  const Pose load = {to_ros(sample.p_WL), to_ros(q_WL)};
   const Twist quadrotor_twist = {to_ros(sample.q_WB.conjugate() * sample.v_WQ),
                                  to_ros(sample.w_WB_B)};
-  const Twist load_twist = {to_ros(sample.v_WL), Eigen::Vector3d::Zero()};
+  const Twist load_twist = {to_ros(q_WL.conjugate() * sample.v_WL),
+                            to_ros(cable ? cable->w_WL_L : Eigen::Vector3d::Zero())};
   const auto send = [&](VehicleChannel channel) {
     emit(vehicle.first_channel + channel, time_ns, cdr.bytes());
   };
@@ -175,7 +186,9 @@ void Mirrors::emit(const VehicleSample& sample, const Emit& emit) {
     send(kLoadReference);
   }
   if (vehicle.markers.is_due(time_ns)) {
-    vehicle.markers.write(cdr, time_ns, quadrotor, load.position, reference);
+    const auto on_cable =
+        cable ? std::optional<LoadOnCable>({*impl_->scene, *cable}) : std::nullopt;
+    vehicle.markers.write(cdr, time_ns, quadrotor, load.position, reference, on_cable);
     send(kMarkers);
   }
 }

@@ -11,6 +11,8 @@
 #include <string>
 #include <vector>
 
+#include "common/scene/load_scene.hpp"
+
 namespace sls::ros {
 
 /// A topic of mirrors.
@@ -34,13 +36,16 @@ struct VehicleSample {
   Eigen::Vector3d p_WL = Eigen::Vector3d::Zero();
   Eigen::Vector3d v_WL = Eigen::Vector3d::Zero();
   std::optional<Eigen::Vector3d> reference;  ///< desired position of the load
+  std::vector<double> signals;               ///< of the plant; read for a load on cables
 };
 
 /// Makes the messages of a run's vehicles; remembers their trails.
 class Mirrors {
  public:
-  /// `vehicle_ids` must be in ascending order.
-  explicit Mirrors(const std::vector<std::uint32_t>& vehicle_ids);
+  /// `vehicle_ids` must be in ascending order. `scene`: the one load of vehicles that carry it by
+  /// cables; none: each has its own load on a rod.
+  explicit Mirrors(const std::vector<std::uint32_t>& vehicle_ids,
+                   std::optional<scene::LoadScene> scene = {});
   ~Mirrors();
 
   const std::vector<Channel>& channels() const;
@@ -53,7 +58,8 @@ class Mirrors {
   /// The messages written once: /tf_static. Call first.
   void emit_static(const Emit& emit);
   /// All messages of one sample: /clock (of a step once), /tf, odometry and poses of quadrotor and
-  /// load; markers of rod, trail and reference, the latter at most every 50 ms of simulation time.
+  /// load; markers at most every 50 ms of simulation time. The markers of a load on cables are with
+  /// those of the first vehicle.
   /// Samples of a vehicle must come in step order; the caller may leave out any of them.
   void emit(const VehicleSample& sample, const Emit& emit);
 

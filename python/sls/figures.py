@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from sls.input_error import InputError
-from sls.trajectory import Trajectory, calc_roll_pitch_yaw
+from sls.trajectory import Trajectory, calc_roll_pitch_yaw, find_spans
 
 QUAD, LOAD, REFERENCE_COLOUR = re.findall(r"#\w{6}", Path(__file__).with_name("colours.css").read_text())
 # For flights that are drawn together. Distinct for readers with any colour vision (Okabe and Ito).
@@ -295,7 +295,7 @@ def draw_columns(all_axes: Sequence[Axes], flights: Sequence[Trajectory],
 
 
 def plot_angles(flights: Sequence[Trajectory]) -> Figure:
-    figure, axes = make_stack(2, "Rod angles", ("α about x (°)", "β about y (°)"))
+    figure, axes = make_stack(2, "Cable angles" if flights[0].cable else "Rod angles", ("α about x (°)", "β about y (°)"))
     draw_columns(axes[:, 0], flights,
                  lambda flight: np.degrees(np.column_stack([flight.alpha, flight.beta])), LOAD)
     return figure
@@ -405,9 +405,46 @@ def plot_thrust(flights: Sequence[Trajectory]) -> Figure:
     return figure
 
 
+def plot_cables(flights: Sequence[Trajectory]) -> Figure:
+    """Tension and length of each cable, and when it is slack or cut."""
+    flights = [flight for flight in flights if flight.cable]
+    figure, axes = make_stack(3, "Cables", ("tension (N)", "length (m)", "cable"), height=1.55)
+    if not flights:
+        return figure
+    for index, flight in enumerate(flights):
+        style = style_of(index, flights)
+        draw(axes[0, 0], flight.time_s, flight.cable.tension, label=flight.name, **style)
+        draw(axes[1, 0], flight.time_s, flight.cable.length, label=flight.name, **style)
+        apart = np.where(flight.cable.is_cut, np.nan, flight.cable.distance)
+        draw(axes[1, 0], flight.time_s, apart, **style | REFERENCE)
+        for holds, look in ((flight.cable.is_slack, {"color": style["color"]}),
+                            (flight.cable.is_cut, {"facecolor": "#dddddd", "edgecolor": "#666666", "hatch": "///"})):
+            spans = find_spans(flight.time_s, holds)
+            axes[2, 0].broken_barh([(begin, end - begin) for begin, end in spans], (index - 0.35, 0.7), **look)
+    axes[1, 0].set_title("wide and light: the distance of its ends", loc="left")
+    axes[2, 0].set_title("coloured: slack; hatched: cut", loc="left")
+    axes[2, 0].set(yticks=range(len(flights)), yticklabels=[flight.name if len(flights) > 1 else "" for flight in flights],
+                   ylim=(len(flights) - 0.5, -0.5))
+    mark_stages(axes[:2, 0], flights)
+    return figure
+
+
+def plot_load_attitude(flights: Sequence[Trajectory]) -> Figure:
+    """Of a rigid load on cables."""
+    figure, axes = make_stack(3, "Attitude of the load", ("roll (°)", "pitch (°)", "yaw (°)"), height=1.55)
+    rigid = [flight for flight in flights if flight.cable and np.any(flight.cable.q_WL[:, 1:])]
+    draw_columns(axes[:, 0], rigid, lambda flight: np.degrees(break_at_turns(
+        calc_roll_pitch_yaw(flight.cable.q_WL))), LOAD)
+    widen(axes[:, 0], 1.0)
+    return figure
+
+
 def plot_fleet(flights: Sequence[Trajectory]) -> Figure:
-    """All vehicles of a recording: the paths of the loads from above, x up, and the error of each."""
-    figure = Figure(figsize=(WIDTH_IN, 4.3), layout="constrained", label=f"Fleet of {len(flights)} vehicles")
+    """All vehicles of a recording: the paths of the loads from above, x up, and the error of each. Of one load on
+    cables: the paths of the vehicles and of its centre, and the errors of the cables' ends."""
+    load = flights[0].cable
+    figure = Figure(figsize=(WIDTH_IN, 4.3), layout="constrained",
+                    label=f"{len(flights)} vehicles on one load" if load else f"Fleet of {len(flights)} vehicles")
     plan, distance = figure.subplots(1, 2)
     # Neither end is invisible on a dark or a light page.
     colours = matplotlib.colormaps["viridis"](np.linspace(0.3, 0.85, len(flights)))
@@ -415,17 +452,20 @@ def plot_fleet(flights: Sequence[Trajectory]) -> Figure:
     rows = sum(len(flight.time_s) for flight in flights)
     every = slice(None, None, 1 + rows // FLEET_POINTS)
     for flight, colour in zip(flights, colours):
-        plan.plot(*flight.p_WL[every, 1::-1].T, color=colour, linewidth=0.8)
+        path = flight.p_WQ if load else flight.p_WL
+        plan.plot(*path[every, 1::-1].T, color=colour, linewidth=0.8)
         sizes.append(np.linalg.norm(flight.calc_error(), axis=1)[every])
         draw(distance, flight.time_s[every], sizes[-1], color=colour, linewidth=0.8)
         if len(flights) <= 64:
-            plan.annotate(flight.name, flight.p_WL[0, 1::-1], fontsize=6.5, color="#444444",
+            plan.annotate(flight.name, path[0, 1::-1], fontsize=6.5, color="#444444",
                           ha="center", va="bottom", xytext=(0, 2), textcoords="offset points")
     plan.set(xlabel="y (m, right)", ylabel="x (m, forward)", aspect="equal")
-    plan.set_title("loads from above; dark: low ids", loc="left")
+    if load is not None:
+        plan.plot(*load.p_WC[every, 1::-1].T, color=LOAD, linewidth=1.8)
+    plan.set_title(f"{'vehicles and load' if load else 'loads'} from above; dark: low ids", loc="left")
     distance.set(xlabel="time (s)", ylabel="distance (m)")
     distance.margins(x=0)
-    distance.set_title("loads to their references", loc="left")
+    distance.set_title(f"{'cable ends' if load else 'loads'} to their references", loc="left")
     set_log_scale(distance, sizes)
     return figure
 
@@ -433,7 +473,8 @@ def plot_fleet(flights: Sequence[Trajectory]) -> Figure:
 FIGURES: dict[str, Callable[[Sequence[Trajectory]], Figure]] = {
     "positions": plot_positions, "errors": plot_errors, "path": plot_path, "angles": plot_angles,
     "forces": plot_forces, "attitude": plot_attitude, "body_attitude": plot_body_attitude,
-    "body_rates": plot_body_rates, "rotors": plot_rotors, "thrust": plot_thrust,
+    "body_rates": plot_body_rates, "rotors": plot_rotors, "thrust": plot_thrust, "cables": plot_cables,
+    "load_attitude": plot_load_attitude,
 }
 
 
@@ -445,7 +486,10 @@ def make_figures(flights: Sequence[Trajectory], fleet: Sequence[Trajectory] = ()
     flights = [flight for flight in flights if len(flight.time_s) > 1]
     plots: dict[str, Callable[[Sequence[Trajectory]], Figure]] = {}
     if flights:
-        plots = {"fleet": lambda _: plot_fleet(fleet), **FIGURES} if len(fleet) > 1 else FIGURES
+        plots = FIGURES
+        if len(fleet) > 1:
+            name = "team" if fleet[0].cable else "fleet"
+            plots = {name: lambda _: plot_fleet(fleet), **FIGURES, "cables": lambda _: plot_cables(fleet)}
     figures = {}
     with matplotlib.rc_context(PAPER if paper else STYLE):
         for name, plot in plots.items():

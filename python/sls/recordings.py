@@ -14,7 +14,7 @@ import yaml
 from sls.columns import Columns
 from sls.core import load_core
 from sls.csv_tables import read_records, read_table, read_text
-from sls.trajectory import Stage, Trajectory, find_stages, read_body
+from sls.trajectory import Stage, Trajectory, find_stages, read_body, read_cable
 from sls.vehicle_columns import VehicleColumns
 from sls.input_error import InputError
 
@@ -274,7 +274,8 @@ class Recording(VehicleColumns):
             stages=self._find_stages(stage, reference, state["sim_time_s"], vehicle_id),
             period_s=self.manifest["period_s"],
             notes=self.list_notes(),
-            body=read_body(state))
+            body=read_body(state),
+            cable=read_cable(state, lambda: self.scenario, vehicle_id))
 
     def _check_vehicle(self, vehicle_id: int) -> None:
         if vehicle_id not in self.vehicle_ids:

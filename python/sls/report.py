@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sls.figures import make_figures, save
-from sls.trajectory import Trajectory
+from sls.trajectory import Trajectory, find_spans
 from sls.metrics import StageMetrics, calc_errors, calc_stage_metrics
 from sls.recordings import Recording, describe_ids
 from sls.scene import MOST_BYTES, make_scene
@@ -20,12 +20,14 @@ from sls.tables import format_error, list_error_cells, list_step_cells
 CAPTIONS = {
     "fleet": "All vehicles: the paths of their loads from above, and how far each load is from its "
              "reference.",
+    "team": "The paths of all vehicles and, orange, of the centre of the load they carry, from above; and how far the ends of "
+            "their cables are from their references.",
     "positions": "Load and quadrotor over time, and where the load should be. The axis of z points "
                  "down, as z does; dotted lines: a stage begins.",
     "errors": "Load position minus reference: as it is, and its size, on a logarithmic axis unless it is always 0.",
     "path": "The same flight in space, one metre as long on each axis; y and z are turned (left, up), so that up is "
             "up. The dot is where the load starts.",
-    "angles": "Angles of the rod; both are 0 where the load hangs straight down.",
+    "angles": "Angles of the rod or cable; both are 0 where the load hangs straight down.",
     "forces": "The force that the controller answers.",
     "attitude": "The attitude that realises this force, with yaw 0.",
     "body_attitude": "Attitude of the vehicle, over the set-point of its autopilot (wide, light).",
@@ -33,6 +35,8 @@ CAPTIONS = {
     "rotors": "Speeds of the rotors, over their set-points in force (wide, light).",
     "thrust": "Thrust of all rotors, over the thrust that the autopilot asks for (wide, light); "
               "and the force of the rod on the quadrotor, along the rod.",
+    "cables": "Tension and length of each cable, the distance of its ends (wide, light), and when it is slack or cut.",
+    "load_attitude": "Attitude of the load.",
 }
 MOST_EVENTS = 200
 # Columns of status.csv that are not counters.
@@ -125,6 +129,7 @@ def make_report(recording: Recording, vehicle_id: int, first: Sequence[str] = ()
         make_section("Flight", make_facts(recording, flight, vehicle_id)),
         make_section("Load position error per stage (m)", make_error_table(flight)),
         make_step_section(flight),
+        make_cable_section(fleet),
         make_fleet_section(fleet),
         make_section("Figures", make_figure_list(flight, fleet, marks)),
         make_section("Events", make_events(recording)),
@@ -170,8 +175,8 @@ def make_facts(recording: Recording, flight: Trajectory, vehicle_id: int) -> str
     model = scenario.get("controller", {}).get("model") or {}
     facts = [
         ("quadrotor mass", f"{vehicle.get('quad_mass_kg', '–')} kg"),
-        ("load mass", f"{vehicle.get('load_mass_kg', '–')} kg"),
-        ("rod length", f"{vehicle.get('rod_length_m', '–')} m"),
+        ("load mass", describe_load_mass(scenario, vehicle, recording.vehicle_ids if flight.cable else [])),
+        ("cable length" if flight.cable else "rod length", f"{vehicle.get('rod_length_m', '–')} m"),
         ("gravity", f"{vehicle.get('gravity_m_s2', '–')} m/s²"),
         ("control period", f"{manifest['period_s']:g} s"),
         ("integration step", f"{manifest.get('step_s', '–')} s"),
@@ -200,6 +205,15 @@ def find_vehicle(scenario: dict[str, Any], vehicle_id: int) -> dict[str, Any]:
     if isinstance(own, list) and vehicle_id < len(own) and isinstance(own[vehicle_id], dict):
         vehicle.update(own[vehicle_id])
     return vehicle
+
+
+def describe_load_mass(scenario: dict[str, Any], vehicle: dict[str, Any], carriers: Sequence[int]) -> str:
+    """The mass of the load, which the vehicles `carriers` carry together; each has its share."""
+    share = vehicle.get("load_mass_kg", "–")
+    if len(carriers) < 2:
+        return f"{share} kg"
+    whole = sum(find_vehicle(scenario, carrier)["load_mass_kg"] for carrier in carriers)
+    return f"{whole:g} kg, of it {share} kg the share of this vehicle"
 
 
 def describe_speed(status: dict[str, str]) -> str:
@@ -264,6 +278,27 @@ def make_step_section(flight: Trajectory) -> str:
         "begins less than 1 cm from its set-point.</p>")
 
 
+def make_cable_section(fleet: Sequence[Trajectory]) -> str:
+    rows = ""
+    for flight in fleet:
+        if flight.cable is None:
+            return ""
+        cable = flight.cable
+        pulls = cable.tension[np.isfinite(cable.tension) & ~cable.is_cut]
+        slack = find_spans(flight.time_s, cable.is_slack)
+        cut = find_spans(flight.time_s, cable.is_cut)
+        numbers = [*([np.mean(pulls), np.max(pulls)] if len(pulls) else [np.nan, np.nan]),
+                   sum(end - begin for begin, end in slack), len(slack), np.min(cable.length), np.max(cable.length),
+                   cut[0][0] if cut else np.nan]
+        cells = [flight.name, *(f"{number:.4g}" if np.isfinite(number) else "–" for number in numbers)]
+        rows += "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+    names = ("vehicle", "mean tension (N)", "max tension (N)", "slack (s)", "times slack", "least length (m)",
+             "greatest length (m)", "first cut at (s)")
+    head = "".join(f"<th>{name}</th>" for name in names)
+    return make_section("Cables", f"<div class=\"scroll\"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody>"
+                        "</table></div>")
+
+
 def make_fleet_section(fleet: Sequence[Trajectory]) -> str:
     if len(fleet) < 2:
         return ""
@@ -274,7 +309,8 @@ def make_fleet_section(fleet: Sequence[Trajectory]) -> str:
         if len(error):
             cells = [flight.name, *map(format_error, np.concatenate(calc_errors(error)))]
             rows += "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
-    return ("<section><details><summary>All vehicles, whole flight (m)</summary>"
+    title = "Ends of all cables" if fleet[0].cable else "All vehicles"
+    return (f"<section><details><summary>{title}, whole flight (m)</summary>"
             "<div class=\"scroll\"><table><thead><tr><th rowspan=\"2\">vehicle</th>"
             "<th colspan=\"3\">rms</th><th colspan=\"3\">max</th></tr><tr>"
             + "<th>x</th><th>y</th><th>z</th>" * 2

@@ -4,8 +4,9 @@ Frame W everywhere: x forward, y right, z down; SI units, radians. Arrays have a
 values that a source does not hold are NaN."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -58,6 +59,26 @@ class Body:
 
 
 @dataclass(frozen=True)
+class Cable:
+    """The own cable of a vehicle that carries one load, alone or with others, and that load."""
+
+    tension: np.ndarray
+    """(n,), N; NaN before the first step."""
+    length: np.ndarray
+    """(n,), m."""
+    distance: np.ndarray
+    """Of its ends, (n,), m."""
+    is_slack: np.ndarray
+    """(n,), neither taut nor cut."""
+    is_cut: np.ndarray
+    """(n,)"""
+    q_WL: np.ndarray
+    """Attitude of the load, (n, 4), w x y z."""
+    p_WC: np.ndarray
+    """Centre of mass of the load, (n, 3), m."""
+
+
+@dataclass(frozen=True)
 class Trajectory:
     name: str
     time_s: np.ndarray
@@ -81,6 +102,8 @@ class Trajectory:
     """Missing parts, a line each."""
     body: Body | None = None
     """None if the source has no attitude and no rotors."""
+    cable: Cable | None = None
+    """None for a rod."""
 
     def calc_error(self) -> np.ndarray:
         """Load position error, (n, 3), m."""
@@ -134,6 +157,33 @@ def read_body(state: Columns) -> Body | None:
         rod_tension=columns("cable_tension_n" if rotors and "cable_tension_n" in state else "rod_tension_n")[:, 0])
     is_known = any(np.any(np.isfinite(getattr(body, field.name))) for field in fields(body))
     return body if is_known else None
+
+
+def read_cable(state: Columns, read_scenario: Callable[[], Mapping[str, Any]], vehicle_id: int) -> Cable | None:
+    """Reads the cable from the columns of the plant `cables`; None if there are no such columns. The scenario tells
+    where it ends in the load."""
+    if "cable_tension_n" not in state:
+        return None
+    cables = read_scenario()["plant"].get("cables") or []
+    own = cables[vehicle_id] if vehicle_id < len(cables) else {}
+    attachment = np.array(own.get("attachment_m", [0, 0, 0]), float)
+    is_cut = np.asarray(state["cable_released"] if "cable_released" in state else 0 * state["cable_taut"]) != 0
+    end = state.stack(("load_x_m", "load_y_m", "load_z_m"))
+    q = state.stack(("load_att_w", "load_att_x", "load_att_y", "load_att_z"))
+    twice = 2 * np.cross(q[:, 1:], attachment)
+    turned = attachment + q[:, :1] * twice + np.cross(q[:, 1:], twice)
+    return Cable(
+        tension=np.where(state["step"] > 0, state["cable_tension_n"], np.nan),
+        length=state["cable_length_m"],
+        distance=np.linalg.norm(end - state.stack(("quad_x_m", "quad_y_m", "quad_z_m")), axis=1),
+        is_slack=(state["cable_taut"] == 0) & ~is_cut, is_cut=is_cut, q_WL=q, p_WC=end - turned)
+
+
+def find_spans(time_s: np.ndarray, holds: np.ndarray) -> list[tuple[float, float]]:
+    """Begin and end, s, of each span of rows in which `holds` (n,) is true."""
+    edges = np.flatnonzero(np.diff(holds.astype(int), prepend=0, append=0))
+    return [(float(time_s[first]), float(time_s[min(end, len(time_s) - 1)]))
+            for first, end in zip(edges[::2], edges[1::2])]
 
 
 def find_stages(stage: np.ndarray, time_s: np.ndarray, names: Mapping[int, str],

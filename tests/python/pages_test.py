@@ -385,6 +385,27 @@ class SceneTest(support.FolderTest):
         text = (support.ROOT / "config/scenarios/figure_eight.yaml").read_text()
         self.expect_large_scene(self.fly("long", re.sub(r"for_s: \d+", "for_s: 160", text)))
 
+    @unittest.skipUnless(FLYER.exists(), "skipped: no closed_loop in this build")
+    @without_drawing
+    def test_one_load_on_cables_is_told_once_with_its_cables(self):
+        text = (support.ROOT / "config/scenarios/cable_cut.yaml").read_text()
+        name = self.fly("cable_cut", text.replace("release_s: 8", "release_s: 1").replace("for_s: 22", "for_s: 2"))
+        flights = Recording(self.folder / name).load_fleet()
+        drawn = figures.make_figures(flights[:1], flights)
+        self.assertLessEqual({"team", "cables", "load_attitude"}, drawn.keys())
+        self.assertNotIn("fleet", drawn)
+        tension, length, _ = drawn["cables"].axes
+        self.assertEqual(len(tension.lines), 4)
+        for flight in flights:  # all vehicles find the same centre of the load
+            np.testing.assert_allclose(flight.cable.p_WC, flights[0].cable.p_WC, rtol=0, atol=1e-12)
+        page, _ = self.make_report(name, "")
+        text = page.read_text()
+        for part in ("0.25 kg, of it 0.0625 kg the share of this vehicle", "cable length", "<h2>Cables</h2>",
+                     "Ends of all cables"):
+            self.assertIn(part, text)
+        self.assertRegex(text, r"<tr><td>0</td>(<td>[^<]*</td>){6}<td>1.004</td></tr>")  # the first step after the cut at 1 s
+        self.assertRegex(text, r"<tr><td>3</td>(<td>[^<]*</td>){6}<td>–</td></tr>")
+
     def expect_large_scene(self, name):
         page, output = self.make_report(name, VIEWER)
         self.assertEqual(page.read_text().count("<iframe"), 1, output)

@@ -9,6 +9,7 @@
 
 #include "common/bus/names.hpp"
 #include "common/config/model_keys.hpp"
+#include "common/scene/load_scene.hpp"
 #include "control_client/reference_trajectory.hpp"
 #include "recorder/rows.hpp"
 
@@ -49,6 +50,23 @@ Json describe_vehicles(const Parameters& parameters, const config::Scenario& sce
     vehicles.push_back(std::move(json));
   }
   return vehicles;
+}
+
+/// The load that the vehicles carry together by cables; null: each has its own on a rod.
+Json describe_load(const Parameters& parameters) {
+  const auto scene = scene::read_load_scene(parameters);
+  if (!scene) return nullptr;
+  Json attachments = Json::object(), outline = Json::array();
+  for (const auto& [id, attachment] : scene->attachments_L)
+    attachments[std::to_string(id)] = to_json(attachment);
+  for (const Eigen::Vector3d& point : scene->outline_L) outline.push_back(to_json(point));
+  return {
+      {"attachments_m", std::move(attachments)},
+      {"outline_m", std::move(outline)},
+      {"full_tension_n", scene->full_tension},
+      {"ground_z_m", scene->ground_z_W ? Json(*scene->ground_z_W) : Json()},
+      {"colours",
+       {{"slack", scene::kSlackColour}, {"low", scene::kLowColour}, {"high", scene::kHighColour}}}};
 }
 
 // --- columns -------------------------------------------------------------------------------------
@@ -121,16 +139,19 @@ std::string describe_run(const Parameters& parameters) {
   Json stages = Json::array();
   for (const config::Stage& stage : scenario.mission) stages.push_back(stage.name);
   const bool is_realtime = parameters.mode() == SyncMode::MODE_REALTIME;
-  const Json run = {{"run_id", run_id},
-                    {"scenario", scenario.name},
-                    {"mode", bus::to_string(parameters.mode())},
-                    {"period_s", static_cast<double>(parameters.period_ns()) * 1e-9},
-                    {"real_time_factor", is_realtime ? parameters.real_time_factor() : 0.0},
-                    {"has_attitude", parameters.has_attitude()},
-                    {"vehicles", describe_vehicles(parameters, scenario)},
-                    {"columns", describe_columns(parameters)},
-                    {"stages", std::move(stages)},
-                    {"path_m", describe_path(config::make_vehicle_scenario(scenario, 0))}};
+  const Json run = {
+      {"run_id", run_id},
+      {"scenario", scenario.name},
+      {"mode", bus::to_string(parameters.mode())},
+      {"period_s", static_cast<double>(parameters.period_ns()) * 1e-9},
+      {"real_time_factor", is_realtime ? parameters.real_time_factor() : 0.0},
+      {"has_attitude", parameters.has_attitude()},
+      {"vehicles", describe_vehicles(parameters, scenario)},
+      {"columns", describe_columns(parameters)},
+      {"stages", std::move(stages)},
+      {"load", describe_load(parameters)},
+      {"path_m", describe_path(scenario.shared_load ? scenario
+                                                    : config::make_vehicle_scenario(scenario, 0))}};
   return run.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

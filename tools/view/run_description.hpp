@@ -20,8 +20,13 @@ inline const std::vector<std::string> kColumns = list_column_names();
 /// "vehicles":[{"id":0,"quad_mass_kg":…,"load_mass_kg":…,"rod_length_m":…,"attachment_m":[x,y,z],
 ///              "rotors":[{"position_m":[x,y,z],"spin":1}]}],
 /// "columns":[{"name":"quad_x_m","unit":"m"},…],"stages":["climb",…],
-/// "path_m":[[x,y,z],…]}
-/// `path_m`: the planned path of vehicle 0's load, at most 2,000 points; frame W, z down. A point
+/// "load":null,"path_m":[[x,y,z],…]}
+/// `load`: of vehicles that carry one load by cables (scene::LoadScene):
+/// {"attachments_m":{"0":[x,y,z],
+/// …},"outline_m":[[x,y,z],…],"full_tension_n":…,"ground_z_m":null,"colours":{"slack":[r,g,b],"low":…,
+/// "high":…}}, positions in the load.
+/// `path_m`: the planned path of vehicle 0's load, or of the centre of the one load, at most 2,000
+/// points; frame W, z down. A point
 /// mass has four rotors that are drawn but not simulated, and "is_drawn_only":true in its vehicle.
 /// @throws config::ConfigError if the scenario text is not a valid scenario.
 std::string describe_run(const Parameters& parameters);

@@ -43,7 +43,7 @@ std::string describe(const Parameters& parameters) {
 McapSink::McapSink(const std::filesystem::path& file, const Parameters& parameters, WriteCall write)
     : period_ns_(parameters.period_ns()),
       file_(file, std::move(write)),
-      mirrors_(sync::list_vehicle_ids(parameters)),
+      mirrors_(sync::list_vehicle_ids(parameters), scene::read_load_scene(parameters)),
       emit_([this](std::size_t channel, std::int64_t time_ns, const auto& message) {
         write_mirror(channel, time_ns, message);
       }) {
@@ -99,6 +99,7 @@ void McapSink::mirror(const StepRows& rows, std::int64_t time_ns) {
     sample.w_WB_B = motion.attitude.w_WB_B;
   }
   if (rows.has_reference) sample.reference = rows.answer.reference.position;
+  sample.signals.assign(motion.signals.begin(), motion.signals.end());
   mirrors_.emit(sample, emit_);
 }
 

@@ -161,6 +161,7 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
     Eigen::Index place = model::SharedLoad::kSignals + (has(&CableKeys::winch) ? 1 : 0);
     if (has(&CableKeys::release_ns)) load.released = place++;
     if (keys.ground_z) load.on_ground = place;
+    load.ground_z_W = keys.ground_z;
     for (std::size_t i = 0; i < scenario.vehicles.size(); ++i)
       load.cables.push_back({scenario.vehicles[i].load_mass.value_or(scenario.vehicle.load_mass),
                              get_cable(keys, i).attachment});

@@ -218,7 +218,7 @@ void Hub::begin_run(const RunView& run) {
   has_time_ = false;
   is_silent_ = false;
   problem_.clear();
-  mirror_source_.emplace(list_vehicles(parameters), period_ns_);
+  mirror_source_.emplace(list_vehicles(parameters), parameters);
   const auto closed = close_vanished_mirrors(mirror_source_->channels());
   const auto opened = open_mirrors(mirror_source_->channels());
   for (const auto& [client, seen] : clients_) {

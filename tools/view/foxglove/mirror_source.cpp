@@ -20,8 +20,10 @@ bool has_reference(const RecordEntry& entry) { return entry.kind() == AnswerKind
 
 }  // namespace
 
-MirrorSource::MirrorSource(const std::vector<std::uint32_t>& vehicle_ids, std::int64_t period_ns)
-    : period_ns_(period_ns), mirrors_(vehicle_ids) {
+MirrorSource::MirrorSource(const std::vector<std::uint32_t>& vehicle_ids,
+                           const Parameters& parameters)
+    : period_ns_(parameters.period_ns()),
+      mirrors_(vehicle_ids, scene::read_load_scene(parameters)) {
   for (const std::uint32_t id : vehicle_ids) vehicles_[id] = {};
 }
 
@@ -69,6 +71,7 @@ void MirrorSource::emit(const RecordEntry& entry, const ros::Mirrors::Emit& emit
   sample.w_WB_B = bus::to_vector(truth.w_WB_B_rad_s());
   sample.p_WL = bus::to_vector(truth.p_WL_m());
   sample.v_WL = bus::to_vector(truth.v_WL_m_s());
+  sample.signals = truth.signals();
   if (has_reference(entry))
     sample.reference = bus::to_vector(entry.answer().reference().position_m());
   mirrors_.emit(sample, emit_message);

@@ -15,8 +15,8 @@ class MirrorSource {
  public:
   using Time = std::chrono::steady_clock::time_point;
 
-  /// `vehicle_ids`: ascending. `period_ns`: time between two steps.
-  MirrorSource(const std::vector<std::uint32_t>& vehicle_ids, std::int64_t period_ns);
+  /// `vehicle_ids`: those of `parameters`, ascending.
+  MirrorSource(const std::vector<std::uint32_t>& vehicle_ids, const Parameters& parameters);
 
   const std::vector<ros::Channel>& channels() const { return mirrors_.channels(); }
   /// Call it first.

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
-#include <optional>
 #include <regex>
 
 #include "common/bus/names.hpp"
@@ -32,7 +31,9 @@ void append_floats(std::string& message, const std::array<double, n>& numbers) {
 }
 
 /// False for the entry of a late answer, and for unknown kinds of later contracts.
-bool has_state(const RecordEntry& entry) { return bus::to_number(entry.kind()) < bus::to_number(AnswerKind::ANSWER_LATE); }
+bool has_state(const RecordEntry& entry) {
+  return bus::to_number(entry.kind()) < bus::to_number(AnswerKind::ANSWER_LATE);
+}
 
 /// The reference that the answer follows; if `may_be_held`, also that of a held older answer.
 std::array<double, 3> find_reference(const RecordEntry& entry, bool may_be_held) {
@@ -67,6 +68,7 @@ void PageFrames::start_run(const Parameters& parameters) {
   has_attitude_ = parameters.has_attitude();
   signals_ = parameters.signals().size();
   rotor_signals_ = find_rotor_signals(parameters);
+  scene_ = scene::read_load_scene(parameters);
   last_steps_.clear();
   for (const VehicleParameters& vehicle : parameters.vehicles())
     last_steps_[vehicle.vehicle_id()] = 0;
@@ -135,11 +137,21 @@ float PageFrames::calc_rotor_rate(const RecordEntry& entry) const {
              : static_cast<float>(sum / static_cast<double>(rotor_signals_.size()));
 }
 
+void PageFrames::append_cable(std::string& message, const PlantState& state) const {
+  const auto found = scene::read_cable(*scene_, state.signals());
+  const scene::Cable cable = found.value_or(scene::Cable());
+  const Eigen::Quaterniond& q = cable.q_WL;
+  const double tension = found ? cable.tension : kNaN;
+  append_floats(
+      message, std::array<double, 8>{tension, cable.length, cable.is_taut ? 1.0 : 0.0, q.w(), q.x(),
+                                     q.y(), q.z(), cable.is_released ? 1.0 : 0.0});
+}
+
 std::string PageFrames::make_poses() const {
   std::uint64_t step = 0;
   for (const auto& item : newest_) step = std::max(step, item.second.step());
   std::string message;
-  message.reserve(40 + 64 * newest_.size());
+  message.reserve(40 + (scene_ ? 96 : 64) * newest_.size());
   append(message, std::uint32_t{1});
   append(message, static_cast<std::uint32_t>(newest_.size()));
   append(message, run_id_);
@@ -155,6 +167,7 @@ std::string PageFrames::make_poses() const {
     append_floats(message, state.p_WL_m());
     append_floats(message, find_reference(entry, true));
     append(message, calc_rotor_rate(entry));
+    if (scene_) append_cable(message, state);
   }
   return message;
 }

@@ -5,10 +5,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/bus/topics.hpp"
+#include "common/scene/load_scene.hpp"
 #include "tools/view/live/feed.hpp"
 
 namespace sls::view {
@@ -60,12 +62,14 @@ class PageFrames {
   std::vector<const RecordEntry*> find_rows(std::uint32_t vehicle_id, std::uint64_t from) const;
   void append_values(std::string& message, const RecordEntry& entry) const;
   float calc_rotor_rate(const RecordEntry& entry) const;
+  void append_cable(std::string& message, const PlantState& state) const;
 
   std::uint64_t run_id_ = 0;
   double period_s_ = 0;
   bool has_attitude_ = false;
   std::size_t signals_ = 0;
-  std::vector<std::size_t> rotor_signals_;             // indices of the rotors' speeds
+  std::vector<std::size_t> rotor_signals_;  // indices of the rotors' speeds
+  std::optional<scene::LoadScene> scene_;
   std::map<std::uint32_t, std::uint64_t> last_steps_;  // last step of the rows made + 1, by vehicle
   std::vector<Sample> samples_;
   std::vector<Decoded> decoded_;  // `count_` are valid; the memory of the others is reused

@@ -18,6 +18,7 @@ ros::VehicleSample make_sample(const RecordEntry& entry, std::int64_t period_ns)
   sample.w_WB_B = truth.attitude.w_WB_B;
   sample.p_WL = truth.p_WL;
   sample.v_WL = truth.v_WL;
+  sample.signals = entry.truth().signals();
   // The reference of an older answer belongs to an older step.
   if (entry.kind() == AnswerKind::ANSWER_ACCEPTED)
     sample.reference = bus::to_vector(entry.answer().reference().position_m());

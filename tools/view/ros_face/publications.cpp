@@ -20,8 +20,9 @@ Publications::Publications(bus::Node& node) : node_(node) {
   });
 }
 
-void Publications::begin(const std::vector<std::uint32_t>& vehicle_ids) {
-  mirrors_.emplace(vehicle_ids);
+void Publications::begin(const std::vector<std::uint32_t>& vehicle_ids,
+                         std::optional<scene::LoadScene> scene) {
+  mirrors_.emplace(vehicle_ids, std::move(scene));
   channels_.clear();
   std::map<std::string, std::unique_ptr<bus::RawWriter>> writers;
   for (const ros::Channel& channel : mirrors_->channels()) {

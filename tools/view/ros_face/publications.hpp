@@ -26,7 +26,8 @@ class Publications {
 
   /// Begins a run: empties the trails of the mirrors, makes writers for its vehicles and removes
   /// the writers of other vehicles. @throws bus::BusError
-  void begin(const std::vector<std::uint32_t>& vehicle_ids);
+  void begin(const std::vector<std::uint32_t>& vehicle_ids,
+             std::optional<scene::LoadScene> scene = {});
 
   /// True if any topic of the run has a reader.
   bool has_readers() const;

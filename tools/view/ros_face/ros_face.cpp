@@ -105,7 +105,7 @@ struct RosFace::Impl : Feed::Listener {
       news = std::exchange(batches, {});
     }
     if (run) {
-      publications.begin(sync::list_vehicle_ids(*run));
+      publications.begin(sync::list_vehicle_ids(*run), scene::read_load_scene(*run));
       newest.emplace(*run);
     }
     if (!newest || !publications.has_readers()) return;

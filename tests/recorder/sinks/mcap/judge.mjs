@@ -253,6 +253,40 @@ function expectMirrors(messages, vehicleIds, isCut) {
   expectEqual(messages.mirrored.get("/tf_static")?.length, 1, "/tf_static: messages");
 }
 
+/** One load on cables, drawn from the columns of state.csv: its attitude, each cable, the load once. */
+function expectCables(messages, vehicleIds) {
+  const near = (a, b) => a.length === b.length && a.every((value, i) => Math.abs(value - b[i]) < 1e-9);
+  const list = ({ x, y, z }) => [x, y, z];
+  const counts = { taut: 0, slack: 0, cut: 0 };
+  const rowOf = (id, time) => messages.files[0].get(`${id} ${BigInt(time) / messages.periodNs}`);
+  if (!("cable_taut" in messages.files[0].values().next().value)) return counts;
+  for (const id of vehicleIds) {
+    for (const { time, value } of messages.mirrored.get(`/sls/vehicle_${id}/load/pose`)) {
+      const [w, x, y, z] = vector(rowOf(id, time), ["w", "x", "y", "z"].map((axis) => `load_att_${axis}`));
+      const { orientation: q } = value.pose;
+      expect(near([q.w, q.x, q.y, q.z], [w, x, -y, -z]), `attitude of the load at ${time}`);
+    }
+    for (const { time, value } of messages.mirrored.get(`/sls/vehicle_${id}/markers`)) {
+      const row = rowOf(id, time);
+      const cable = value.markers.find((marker) => marker.id === 1);
+      const points = cable.points.map(list);
+      const state = row.cable_released === "1" ? "cut" : row.cable_taut === "1" ? "taut" : "slack";
+      ++counts[state];
+      expectEqual(cable.action, state === "cut" ? 2 : 0, `cable at ${time}: action`);
+      const ends = ["quad_", "load_"].map((name) => xyz(row, name, "_m")).map(([x, y, z]) => [x, -y, -z]);
+      expect(near(points[0], ends[0]) && near(points.at(-1), ends[1]), `cable at ${time}: ends`);
+      const length = points.slice(1).reduce((sum, point, i) => sum + Math.hypot(...point.map((p, axis) => p - points[i][axis])), 0);
+      // A curve in 24 parts is a little shorter; one that lies on the ground is drawn without its folds.
+      const ratio = length / Number(row.cable_length_m);
+      const mayLie = state === "slack" && "load_on_ground" in row;
+      if (state !== "cut" && !mayLie) expect(ratio < 1 + 1e-6 && ratio > 0.995, `cable at ${time}: length ${length}`);
+      const hasLoad = value.markers.some((marker) => marker.id === 2);
+      expectEqual(hasLoad, id === Math.min(...vehicleIds), `load drawn with vehicle ${id}`);
+    }
+  }
+  return counts;
+}
+
 async function main(options) {
   const value = (name) => {
     const at = options.indexOf(name);
@@ -273,7 +307,8 @@ async function main(options) {
   if (!isCut) expectEqual(streamed.keys.join(), states.join(), "steps in the order of state.csv");
   else expectEqual(streamed.keys.join(), states.slice(0, streamed.keys.length).join(), "steps from the first one");
   expectMirrors(streamed, manifest.vehicle_ids, isCut);
-  const result = { messages: Object.fromEntries(streamed.counts), records: stream.counts };
+  const cables = expectCables(streamed, manifest.vehicle_ids);
+  const result = { cables, messages: Object.fromEntries(streamed.counts), records: stream.counts };
   if (!isCut) {
     const indexed = new Messages(files, periodNs);
     const { attachments, chunks } = await readIndexed(bytes, indexed);

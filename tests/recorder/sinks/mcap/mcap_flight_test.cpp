@@ -86,6 +86,16 @@ faults:
   EXPECT_EQ(read_file(convert(recording)) == read_file(recording / "sls.mcap"), true);
 }
 
+TEST_F(McapFlightTest, OneLoadIsDrawnOnceWithItsAttitudeAndCablesThatAreTautSlackOrCut) {
+  const fs::path cut = fly(
+      make_file("cable_cut", "", {{"release_s: 8", "release_s: 1"}, {"for_s: 22", "for_s: 1"}}));
+  const auto cables = judge(cut).at("cables");
+  EXPECT_GT(cables.at("taut"), 160);  // 20 a second and vehicle
+  EXPECT_GT(cables.at("cut"), 30);
+  const fs::path slack = fly(make_file("slack_drop", "", {{"for_s: 10", "for_s: 1"}}), "slack");
+  EXPECT_GT(judge(slack).at("cables").at("slack"), 4);
+}
+
 TEST_F(McapFlightTest, AFlightHasTheSameBytesOverSharedMemoryOverUdpAndInOneProcess) {
   const std::string file = make_file("short", "vehicles: 2\n");
   const fs::path recording = fly(file);

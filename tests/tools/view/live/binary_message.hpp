@@ -38,6 +38,7 @@ struct PoseOfVehicle {
   std::uint32_t kind = 0;
   std::vector<float> quad, attitude, load, reference;
   float rotor_rate = 0;
+  std::vector<float> cable;  ///< tension, length, taut, attitude of the load, released
 };
 
 struct Poses {
@@ -59,7 +60,7 @@ inline std::uint32_t find_kind(std::string_view message) {
   return BinaryReader(message).read<std::uint32_t>();
 }
 
-inline Poses read_poses(std::string_view message) {
+inline Poses read_poses(std::string_view message, bool has_cables = false) {
   BinaryReader reader(message);
   if (reader.read<std::uint32_t>() != 1) throw std::runtime_error("no poses");
   Poses poses;
@@ -77,6 +78,7 @@ inline Poses read_poses(std::string_view message) {
     pose.load = reader.read_many<float>(3);
     pose.reference = reader.read_many<float>(3);
     pose.rotor_rate = reader.read<float>();
+    if (has_cables) pose.cable = reader.read_many<float>(8);
   }
   if (!reader.is_at_end()) throw std::runtime_error("bytes left over");
   return poses;

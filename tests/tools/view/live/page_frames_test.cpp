@@ -66,6 +66,20 @@ TEST(PageFramesTest, PosesAreTheNewestStepWithEveryFieldInItsPlace) {
   EXPECT_EQ(pose.rotor_rate, 200);
 }
 
+TEST(PageFramesTest, PosesOfALoadOnCablesHaveTheirSignals) {
+  PageFrames frames;
+  auto parameters = make_parameters(kRun, {0}, "slack_drop");
+  for (int i = 0; i < 11; ++i)
+    parameters.signals().emplace_back().name(i == 10 ? "cable_released" : "other");
+  frames.start_run(parameters);
+  auto batch = make_batch(kRun, 10, 10);
+  batch.entries().back().truth().signals({2.5, 1.5, 1, 0.5, -0.5, 0.5, -0.5, 7, 8, 9, 1});
+  frames.add(make_sample(batch));
+  ASSERT_TRUE(frames.decode());
+  const auto poses = test::read_poses(frames.make_poses(), true);
+  EXPECT_EQ(poses.vehicles.at(0).cable, (std::vector<float>{2.5, 1.5, 1, 0.5, -0.5, 0.5, -0.5, 1}));
+}
+
 TEST(PageFramesTest, AFleetWhoseStepIsSpreadOverBatchesIsWhole) {
   const auto ids = make_ids(100);
   PageFrames frames;

@@ -63,6 +63,16 @@ TEST(RunDescriptionTest, RotorsAreThoseOfThePlant) {
   EXPECT_EQ(vehicle.at("rotors").at(2), json({{"position_m", {0.13, -0.22, 0.0}}, {"spin", -1}}));
 }
 
+TEST(RunDescriptionTest, OneLoadOnCablesIsDescribedAndItsPathIsThatOfItsCentre) {
+  EXPECT_EQ(describe(make_parameters(1)).at("load"), nullptr);
+  const json run = describe(make_parameters(1, {0, 1, 2}, "three_carry_a_triangle_pose"));
+  const json& load = run.at("load");
+  EXPECT_EQ(load.at("attachments_m").at("1"), json({0.3083, 0, -0.01125}));
+  EXPECT_EQ(load.at("outline_m").size(), 3u);
+  EXPECT_EQ(load.at("ground_z_m"), nullptr);
+  EXPECT_EQ(run.at("path_m").at(0), json({0, 0, -1}));
+}
+
 TEST(RunDescriptionTest, EveryShippedScenarioHasOneOfBoundedSize) {
   for (const auto& file : std::filesystem::directory_iterator(SLS_SOURCE_DIR "/config/scenarios")) {
     if (file.path().extension() != ".yaml") continue;

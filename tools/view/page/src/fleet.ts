@@ -3,6 +3,7 @@ import {
   BackSide,
   BufferAttribute,
   BufferGeometry,
+  Color,
   DataTexture,
   DoubleSide,
   FloatType,
@@ -15,6 +16,7 @@ import {
   Vector3,
   type Camera,
 } from "three";
+import { calcCablePoints, calcColour, findLoad, hasLoad, kCableParts } from "./cables";
 import { kLoadColour, kReferenceColour, type Theme } from "./colours";
 import {
   calcLoadRadius,
@@ -23,13 +25,16 @@ import {
   makeBladeGeometry,
   makeDiscGeometry,
   makeFrameGeometry,
+  makeLoadGeometry,
   makeReticleGeometry,
   makeRodGeometry,
   makeShadowGeometry,
+  paint,
   type Airframe,
 } from "./parts";
 import { toScene, toSceneRotation } from "./frames";
-import type { Pose, Run, RunIndex, Vehicle } from "./types";
+import { calcGroundHeight } from "./ground";
+import type { Cable, Pose, Run, RunIndex, Vehicle } from "./types";
 
 const kNominalRate = 700; // rad/s, for rotors of unknown rate
 const kDrawnRate = 9; // rad/s at the nominal rate: faster rotors seem to stand still on a screen
@@ -43,7 +48,13 @@ export interface Body {
   readonly airframe: Airframe;
   readonly loadRadius: number;
   readonly quad: Vector3;
+  /** Of the load, or of the end of the cable. */
   readonly load: Vector3;
+  /** Of the load. */
+  readonly centre: Vector3;
+  readonly loadRotation: Quaternion;
+  readonly hasLoad: boolean;
+  cable: Cable | null;
   readonly reference: Vector3;
   readonly rotation: Quaternion;
   hasPose: boolean;
@@ -74,6 +85,14 @@ class Part {
     this.mesh.frustumCulled = false;
     this.mesh.renderOrder = order;
     group.add(this.mesh);
+  }
+
+  /** Changes the colour of a copy of a geometry that has colours. */
+  paint(index: number, colour: Color): void {
+    const { array, count } = this.mesh.geometry.getAttribute("color");
+    const vertices = count / this.matrices.image.height;
+    for (let i = index * vertices; i < (index + 1) * vertices; ++i) colour.toArray(array as Float32Array, 3 * i);
+    this.mesh.geometry.getAttribute("color").needsUpdate = true;
   }
 
   set(index: number, matrix: Matrix4): void {
@@ -116,7 +135,9 @@ export class Fleet {
   private readonly frames: { part: Part; outline: Part; members: number[] }[] = [];
   private readonly discs: Part;
   private readonly blades: Part;
+  /** Rods; or of each cable `kCableParts`. */
   private readonly rods: Part;
+  private readonly rigidLoad: Part | null;
   private readonly loads: Part;
   private readonly outlines: Part;
   private readonly reticles: Part;
@@ -126,13 +147,23 @@ export class Fleet {
   private spin = 0;
   private simTime = NaN;
 
-  constructor(run: Run, index: RunIndex, theme: Theme, isMany: boolean, isCoarse: boolean) {
-    this.bodies = run.vehicles.map((vehicle) => ({
+  constructor(
+    private readonly run: Run,
+    index: RunIndex,
+    theme: Theme,
+    isMany: boolean,
+    isCoarse: boolean,
+  ) {
+    this.bodies = run.vehicles.map((vehicle, place) => ({
       vehicle,
       airframe: makeAirframe(vehicle),
-      loadRadius: calcLoadRadius(vehicle),
+      loadRadius: calcLoadRadius(run, vehicle),
       quad: new Vector3(),
       load: new Vector3(),
+      centre: new Vector3(),
+      loadRotation: new Quaternion(),
+      hasLoad: hasLoad(run, place),
+      cable: null,
       reference: new Vector3(),
       rotation: new Quaternion(),
       hasPose: false,
@@ -153,7 +184,11 @@ export class Fleet {
       outline.mesh.visible = !isCoarse;
       this.frames.push({ part, outline, members });
     }
-    this.rods = this.add(makeRodGeometry(), count, 3, { colour: "frame", opacity });
+    this.rods = run.load
+      ? this.add(paint(makeRodGeometry(), new Color()), count * kCableParts, 3, { opacity, vertexColors: true })
+      : this.add(makeRodGeometry(), count, 3, { colour: "frame", opacity });
+    const isRigid = run.load && run.load.outline_m.length > 1;
+    this.rigidLoad = isRigid ? this.add(makeLoadGeometry(run), 1, 3, { opacity, vertexColors: true, side: DoubleSide }) : null;
     this.outlines = this.add(makeBallGeometry(isCoarse), count, 3, { colour: "outline", side: BackSide, opacity });
     for (const { mesh } of [this.shadows, this.outlines]) mesh.visible = !isCoarse;
     this.loads = this.add(makeBallGeometry(isCoarse), count, 4, { fixed: kLoadColour, opacity });
@@ -183,6 +218,9 @@ export class Fleet {
       if (!body) continue;
       toScene(pose.quad, body.quad);
       toScene(pose.load, body.load);
+      toScene(findLoad(pose, this.run), body.centre);
+      body.cable = pose.cable;
+      if (pose.cable) toSceneRotation(pose.cable.attitude, body.loadRotation);
       toSceneRotation(pose.attitude, body.rotation);
       body.hasReference = Number.isFinite(pose.reference[0]);
       if (body.hasReference) toScene(pose.reference, body.reference);
@@ -281,25 +319,38 @@ export class Fleet {
 
   private updateRods(metresPerPixel: number): void {
     const radius = Math.max(0.008, 0.7 * metresPerPixel);
-    this.bodies.forEach(({ vehicle, quad, load, rotation, hasPose }, index) => {
-      toScene(vehicle.attachment_m, scratch.point).applyQuaternion(rotation).add(quad);
-      scratch.along.subVectors(load, scratch.point);
-      const length = scratch.along.length();
-      scratch.turn.setFromUnitVectors(kUp, length > 0 ? scratch.along.divideScalar(length) : kUp);
+    this.bodies.forEach(({ vehicle, quad, load, rotation, hasPose, cable }, index) => {
+      const from = toScene(vehicle.attachment_m, new Vector3()).applyQuaternion(rotation).add(quad);
       const size = hasPose ? radius : 0;
-      this.rods.set(index, compose(scratch.point, scratch.turn, size, size, hasPose ? length : 0));
+      if (!this.run.load || !cable) return this.setRod(index * (this.run.load ? kCableParts : 1), from, load, size);
+      const points = calcCablePoints(this.run.load, cable, from, load);
+      const colour = calcColour(this.run.load, cable, scratch.colour);
+      for (let part = 0; part < kCableParts; ++part) {
+        const [begin, end] = [points[part], points[part + 1]];
+        const copy = index * kCableParts + part;
+        this.setRod(copy, begin ?? load, end ?? load, end ? size : 0);
+        this.rods.paint(copy, colour);
+      }
     });
   }
 
+  private setRod(copy: number, from: Vector3, to: Vector3, radius: number): void {
+    scratch.along.subVectors(to, from);
+    const length = scratch.along.length();
+    scratch.turn.setFromUnitVectors(kUp, length > 0 ? scratch.along.divideScalar(length) : kUp);
+    this.rods.set(copy, compose(from, scratch.turn, radius, radius, radius > 0 ? length : 0));
+  }
+
   private updateBalls(camera: Camera, scale: number, metresPerPixel: number): void {
-    this.bodies.forEach(({ load, reference, quad, loadRadius, airframe, hasPose, hasReference }, index) => {
-      const size = hasPose ? scale * loadRadius : 0;
-      this.loads.set(index, compose(load, kLevel, size, size, size));
-      const grown = hasPose ? size + 1.3 * metresPerPixel : 0;
-      this.outlines.set(index, compose(load, kLevel, grown, grown, grown));
-      const reticle = hasReference && hasPose ? size : 0;
+    this.bodies.forEach(({ centre, reference, quad, loadRadius, airframe, hasPose, hasReference, ...body }, index) => {
+      const size = hasPose && body.hasLoad ? scale * loadRadius : 0;
+      this.loads.set(index, compose(centre, kLevel, size, size, size));
+      const grown = size > 0 ? size + 1.3 * metresPerPixel : 0;
+      this.outlines.set(index, compose(centre, kLevel, grown, grown, grown));
+      if (index === 0) this.rigidLoad?.set(0, compose(centre, body.loadRotation, 1, 1, hasPose ? 1 : 0));
+      const reticle = hasReference && hasPose ? scale * loadRadius : 0;
       this.reticles.set(index, compose(reference, camera.quaternion, reticle, reticle, reticle));
-      scratch.point.set(quad.x, quad.y, 0.004);
+      scratch.point.set(quad.x, quad.y, 0.004 + calcGroundHeight(this.run));
       const shadow = hasPose ? airframe.radius * 1.1 : 0;
       this.shadows.set(index, compose(scratch.point, kLevel, shadow, shadow, shadow));
     });
@@ -313,6 +364,7 @@ const scratch = {
   along: new Vector3(),
   turn: new Quaternion(),
   scale: new Vector3(),
+  colour: new Color(),
   matrix: new Matrix4(),
 };
 

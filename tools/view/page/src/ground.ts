@@ -1,4 +1,4 @@
-/** The ground at height 0 with a grid in metres, and the planned path. */
+/** The ground, at height 0 unless the run has one elsewhere, with a grid in metres, and the planned path. */
 import { BufferAttribute, BufferGeometry, Color, Line, LineBasicMaterial, LineDashedMaterial, LineSegments, Vector3 } from "three";
 import { kReferenceColour, type Theme } from "./colours";
 import { toScene } from "./frames";
@@ -11,13 +11,14 @@ export interface Extent {
   back: number;
   front: number;
   step: number;
+  height: number;
   /** Lines at multiples of this many steps are stronger and have labels. */
   major: number;
 }
 
 export class Ground {
   readonly lines = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ vertexColors: true, toneMapped: false }));
-  extent: Extent = { left: -5, right: 5, back: -5, front: 5, step: 1, major: 5 };
+  extent: Extent = { left: -5, right: 5, back: -5, front: 5, step: 1, height: 0, major: 5 };
   private theme: Theme;
 
   constructor(theme: Theme) {
@@ -27,8 +28,8 @@ export class Ground {
     this.build();
   }
 
-  /** Makes the ground cover this area, in scene coordinates, with a margin. */
-  cover(minimum: Vector3, maximum: Vector3): boolean {
+  /** Makes the ground at this height cover this area, in scene coordinates, with a margin. */
+  cover(minimum: Vector3, maximum: Vector3, height: number): boolean {
     const size = Math.max(maximum.x - minimum.x, maximum.y - minimum.y, 2);
     const step = size <= 24 ? 1 : size <= 120 ? 5 : 50;
     const margin = Math.max(3 * step, 0.35 * size);
@@ -38,6 +39,7 @@ export class Ground {
       back: Math.floor((minimum.y - margin) / step) * step,
       front: Math.ceil((maximum.y + margin) / step) * step,
       step,
+      height,
       major: step === 5 ? 2 : 5,
     };
     if (JSON.stringify(extent) === JSON.stringify(this.extent)) return false;
@@ -52,13 +54,13 @@ export class Ground {
   }
 
   private build(): void {
-    const { left, right, back, front, step, major } = this.extent;
+    const { left, right, back, front, step, height, major } = this.extent;
     const minor = new Color(this.theme.grid);
     const strong = new Color(this.theme.gridMajor);
     const points: number[] = [];
     const colours: number[] = [];
     const add = (x0: number, y0: number, x1: number, y1: number, place: number) => {
-      points.push(x0, y0, 0, x1, y1, 0);
+      points.push(x0, y0, height, x1, y1, height);
       const colour = Math.round(place / step) % major === 0 ? strong : minor;
       colours.push(...colour.toArray(), ...colour.toArray());
     };
@@ -69,6 +71,11 @@ export class Ground {
     this.lines.geometry.setAttribute("position", new BufferAttribute(new Float32Array(points), 3));
     this.lines.geometry.setAttribute("color", new BufferAttribute(new Float32Array(colours), 3));
   }
+}
+
+/** Height of the ground of a run, in scene coordinates. */
+export function calcGroundHeight(run: Run | undefined): number {
+  return 0 - (run?.load?.ground_z_m ?? 0);
 }
 
 /** The planned path of the load, dashed. */

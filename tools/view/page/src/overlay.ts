@@ -1,6 +1,7 @@
 /** Text over the scene: metres of the grid, names of vehicles, the axes of frame W, a scale. Drawn flat on a canvas. */
 import { Vector3 } from "three";
 import type { View } from "./camera";
+import { describeCable } from "./cables";
 import type { Theme } from "./colours";
 import type { Body } from "./fleet";
 import type { Extent } from "./ground";
@@ -30,7 +31,7 @@ export class Overlay {
     context.clearRect(0, 0, this.width, this.height);
     context.font = kFont;
     this.drawMetres(view, theme, extent);
-    if (bodies.length > 1) this.drawNames(view, theme, bodies, selected);
+    if (bodies.length > 1 || bodies[0]?.cable) this.drawNames(view, theme, bodies, selected);
     this.drawAxes(view, theme);
     if (view.isFlat) this.drawScale(view, theme);
     if (title) {
@@ -58,14 +59,14 @@ export class Overlay {
     };
     const pad = 0.35 * extent.step;
     if (view.mode === "side") {
-      label(extent.left, extent.right, (x) => point.set(x, extent.back, -pad), (x) => `${format(x)} m`);
+      label(extent.left, extent.right, (x) => point.set(x, extent.back, extent.height - pad), (x) => `${format(x)} m`);
       label(extent.step, 100 * extent.step, (z) => point.set(extent.left - pad, 0, z), (z) => `${format(z)} m high`);
       return;
     }
-    label(extent.left, extent.right, (x) => point.set(x, extent.back - pad, 0), (x) => `x ${format(x)} m`);
-    label(extent.left, extent.right, (x) => point.set(x, extent.front + pad, 0), (x) => `x ${format(x)} m`);
-    label(extent.back + spacing, extent.front - spacing, (y) => point.set(extent.left - pad, y, 0), (y) => `y ${format(-y)} m`);
-    label(extent.back + spacing, extent.front - spacing, (y) => point.set(extent.right + pad, y, 0), (y) => `y ${format(-y)} m`);
+    label(extent.left, extent.right, (x) => point.set(x, extent.back - pad, extent.height), (x) => `x ${format(x)} m`);
+    label(extent.left, extent.right, (x) => point.set(x, extent.front + pad, extent.height), (x) => `x ${format(x)} m`);
+    label(extent.back + spacing, extent.front - spacing, (y) => point.set(extent.left - pad, y, extent.height), (y) => `y ${format(-y)} m`);
+    label(extent.back + spacing, extent.front - spacing, (y) => point.set(extent.right + pad, y, extent.height), (y) => `y ${format(-y)} m`);
   }
 
   private drawNames(view: View, theme: Theme, bodies: readonly Body[], selected: number): void {
@@ -78,14 +79,15 @@ export class Overlay {
       const pixel = view.project(body.quad);
       if (!pixel) continue;
       const isSelected = body.vehicle.id === selected;
-      const cell = `${Math.round(pixel[0] / 24)},${Math.round(pixel[1] / 14)}`;
+      const cell = `${Math.round(pixel[0] / (body.cable ? 60 : 24))},${Math.round(pixel[1] / 14)}`;
       if (taken.has(cell)) continue;
       taken.add(cell);
       const radius = Math.max(11, body.airframe.radius / view.metresPerPixel);
-      if (isSelected) this.drawSelection(pixel, radius, theme);
+      if (isSelected && bodies.length > 1) this.drawSelection(pixel, radius, theme);
       context.fillStyle = isSelected ? theme.text : theme.muted;
       context.font = isSelected ? `600 ${kFont}` : kFont;
-      context.fillText(String(body.vehicle.id), pixel[0], pixel[1] - radius - 9);
+      const name = body.cable ? `${body.vehicle.id}: ${describeCable(body.cable)}` : String(body.vehicle.id);
+      context.fillText(name, pixel[0], pixel[1] - radius - 9);
     }
     context.font = kFont;
   }

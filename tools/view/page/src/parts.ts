@@ -2,18 +2,21 @@
 import {
   BoxGeometry,
   BufferAttribute,
+  BufferGeometry,
   CircleGeometry,
   Color,
   ConeGeometry,
   CylinderGeometry,
   IcosahedronGeometry,
   PlaneGeometry,
+  Quaternion,
   RingGeometry,
-  type BufferGeometry,
+  Vector3,
 } from "three";
 import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
-import { kQuadColour } from "./colours";
-import type { Rotor, Vehicle } from "./types";
+import { kLoadColour, kQuadColour } from "./colours";
+import { toScene } from "./frames";
+import type { Rotor, Run, Vehicle } from "./types";
 
 /** Rotors for a run without a description of rotors. */
 const kDrawnRotors: readonly Rotor[] = [
@@ -45,13 +48,16 @@ export function makeAirframe(vehicle: Vehicle): Airframe {
   return { key: JSON.stringify(rotors), rotors, radius, rotorRadius: Math.min(0.46 * nearest, 0.75 * radius) };
 }
 
-/** Radius of a ball of the load's mass, of about the density of wood. */
-export function calcLoadRadius(vehicle: Vehicle): number {
-  const radius = Math.cbrt((3 * vehicle.load_mass_kg) / (4 * Math.PI * 600));
+/** Radius of a ball of the load's mass, of about the density of wood. Of a rigid load it marks the centre alone. */
+export function calcLoadRadius(run: Run, vehicle: Vehicle): number {
+  if (run.load && run.load.outline_m.length > 0) return 0.04;
+  const mass = run.load ? run.vehicles.reduce((sum, { load_mass_kg }) => sum + load_mass_kg, 0) : vehicle.load_mass_kg;
+  const radius = Math.cbrt((3 * mass) / (4 * Math.PI * 600));
   return Math.min(0.4 * vehicle.rod_length_m, Math.max(0.05, radius));
 }
 
-function paint(geometry: BufferGeometry, colour: Color): BufferGeometry {
+/** With a colour at each vertex. */
+export function paint(geometry: BufferGeometry, colour: Color): BufferGeometry {
   const result = geometry.index ? geometry.toNonIndexed() : geometry;
   const count = result.getAttribute("position").count;
   const values = new Float32Array(3 * count);
@@ -102,6 +108,27 @@ export function makeBladeGeometry(): BufferGeometry {
 /** A rod from the origin along +z; radius and length 1. */
 export function makeRodGeometry(): BufferGeometry {
   return new CylinderGeometry(1, 1, 1, 6, 1, true).rotateX(Math.PI / 2).translate(0, 0, 0.5);
+}
+
+/** A rigid load, in the frame of the load: rods along its outline, and a darker plate within. */
+export function makeLoadGeometry(run: Run): BufferGeometry {
+  const corners = (run.load?.outline_m ?? []).map((point) => toScene(point, new Vector3()));
+  const centre = corners.reduce((sum, corner) => sum.addScaledVector(corner, 1 / corners.length), new Vector3());
+  const colour = new Color(kLoadColour);
+  const parts: BufferGeometry[] = [];
+  corners.forEach((corner, index) => {
+    const next = corners[(index + 1) % corners.length]!;
+    const along = new Vector3().subVectors(next, corner);
+    const length = along.length();
+    if (length < 1e-6) return;
+    const turn = new Quaternion().setFromUnitVectors(new Vector3(0, 0, 1), along.divideScalar(length));
+    const rod = makeRodGeometry().scale(0.016, 0.016, length).applyQuaternion(turn);
+    parts.push(paint(rod.translate(corner.x, corner.y, corner.z), colour));
+    const plate = new BufferGeometry().setFromPoints([centre, corner, next]);
+    plate.computeVertexNormals();
+    parts.push(paint(plate, colour.clone().multiplyScalar(0.45)));
+  });
+  return mergeGeometries(parts);
 }
 
 export function makeBallGeometry(isCoarse: boolean): BufferGeometry {

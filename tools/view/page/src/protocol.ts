@@ -1,7 +1,8 @@
 /** Binary messages of subprotocol sls.view.1 (tools/view/README.md), little-endian. */
-import type { Pose, Rows } from "./types";
+import type { Cable, Pose, Rows } from "./types";
 
 const kPoseBytes = 64;
+const kCableBytes = 32; // more of each pose, of a run with one load on cables
 const kPosesHeader = 40;
 const kRowsHeader = 24;
 
@@ -29,18 +30,21 @@ export function readKind(message: ArrayBuffer): number {
 export function readPoses(message: ArrayBuffer): Poses {
   const view = new DataView(message);
   const count = view.getUint32(4, true);
-  if (message.byteLength !== kPosesHeader + count * kPoseBytes)
-    throw new Error(`poses: expected ${kPosesHeader + count * kPoseBytes} bytes, got ${message.byteLength}`);
+  const hasCables = message.byteLength === kPosesHeader + count * (kPoseBytes + kCableBytes);
+  const size = kPoseBytes + (hasCables ? kCableBytes : 0);
+  if (message.byteLength !== kPosesHeader + count * size)
+    throw new Error(`poses: expected ${kPosesHeader + count * size} bytes, got ${message.byteLength}`);
   const poses: Pose[] = new Array(count);
   for (let i = 0; i < count; ++i) {
-    const at = kPosesHeader + i * kPoseBytes;
-    const numbers = new Float32Array(message, at + 8, 14);
+    const at = kPosesHeader + i * size;
+    const numbers = new Float32Array(message, at + 8, size / 4 - 2);
     poses[i] = {
       vehicleId: view.getUint32(at, true),
       kind: view.getUint32(at + 4, true),
       quad: numbers.subarray(0, 3),
       attitude: numbers.subarray(3, 7),
       load: numbers.subarray(7, 10),
+      cable: hasCables && Number.isFinite(numbers[14]) ? readCable(numbers.subarray(14)) : null,
       reference: numbers.subarray(10, 13),
       rotorRate: numbers[13]!,
     };
@@ -52,6 +56,11 @@ export function readPoses(message: ArrayBuffer): Poses {
     publishedMs: view.getFloat64(32, true),
     poses,
   };
+}
+
+function readCable(numbers: Float32Array): Cable {
+  const [tension, length, taut, , , , , released] = Array.from(numbers) as [number, number, ...number[]];
+  return { tension, length, isTaut: taut === 1, isReleased: released === 1, attitude: numbers.subarray(3, 7) };
 }
 
 /** @throws Error if the length does not fit rows and columns. */

@@ -1,10 +1,11 @@
 /** The flight in three dimensions. Draws after changes, at most once a frame. */
 import { Box3, Color, Scene as World, Vector3, WebGLRenderer, type Line } from "three";
+import { calcCablePoints } from "./cables";
 import { control, View } from "./camera";
 import { onThemeChange, readTheme, type Theme } from "./colours";
 import { Fleet, type Body } from "./fleet";
 import { toScene } from "./frames";
-import { Ground, makePath } from "./ground";
+import { calcGroundHeight, Ground, makePath } from "./ground";
 import { Overlay } from "./overlay";
 import { Trails } from "./trails";
 import type { CameraMode, Pose, Run, RunIndex, Trail } from "./types";
@@ -163,11 +164,12 @@ export class Scene {
       }
     }
     if (box.isEmpty()) box.set(new Vector3(-2, -2, 0), new Vector3(2, 2, 2));
-    this.ground.cover(box.min, box.max);
+    const height = calcGroundHeight(this.layers[0]?.run);
+    this.ground.cover(box.min, box.max, height);
     // Includes the rod above the planned path of the load.
     const rod = Math.max(...(this.layers[0]?.run.vehicles.map((vehicle) => vehicle.rod_length_m) ?? [1]));
     box.expandByPoint(new Vector3(box.min.x, box.min.y, Math.max(box.max.z, pathTop + rod)));
-    if (box.min.z > 0) box.min.z = 0;
+    if (box.min.z > height) box.min.z = height;
     this.view.fit(box);
     this.invalidate();
   }
@@ -215,6 +217,14 @@ export class Scene {
     const load = place(body.load);
     if (!quad || !load) return null;
     return { quad, load, reference: body.hasReference ? place(body.reference) : null };
+  }
+
+  /** Points of the vehicle's cable in frame W, of a load on cables; none if it is cut. */
+  cable(vehicleId: number): number[][] | null {
+    const body = this.body(vehicleId);
+    const load = this.layers[0]?.run.load;
+    if (!body?.cable || !load) return null;
+    return calcCablePoints(load, body.cable, body.quad, body.load).map(({ x, y, z }) => [x, -y, -z]);
   }
 
   /** The camera: mode, target in frame W, metres across the picture's height at the target, area in CSS pixels. */

@@ -41,19 +41,27 @@ export function describePlots(run: Run): PlotDescription[] {
     return load < 0 || reference < 0 ? [] : [{ label: axis, calc: (row: Float32Array) => row[load]! - row[reference]! }];
   });
   add("error", "Tracking error", "m", error);
-  add("rod", "Rod angles", "°", [...plain("alpha_rad", "α", kDegrees), ...plain("beta_rad", "β", kDegrees)]);
-  add("force", "Force", "N", ["x", "y", "z"].flatMap((axis) => plain(`force_${axis}_n`, axis)));
-  if (run.has_attitude) {
-    const places = ["w", "x", "y", "z"].map((axis) => columns.find(`att_${axis}`));
-    if (places.every((place) => place >= 0)) {
-      const [w, x, y, z] = places as [number, number, number, number];
-      const angles = ["roll", "pitch", "yaw"].map((label, index) => ({
-        label,
-        calc: (row: Float32Array) => calcEuler(row[w]!, row[x]!, row[y]!, row[z]!)[index]! * kDegrees,
-      }));
-      add("attitude", "Attitude", "°", angles);
-    }
+  const apart = ["x", "y", "z"].map((axis) => [columns.find(`quad_${axis}_m`), columns.find(`load_${axis}_m`)] as const);
+  if (run.load) {
+    add("tension", "Cable tension", "N", plain("cable_tension_n", "tension"));
+    add("length", "Cable length, and distance of its ends", "m", [
+      ...plain("cable_length_m", "length"),
+      { label: "distance", calc: (row) => Math.hypot(...apart.map(([a, b]) => row[a]! - row[b]!)) },
+    ]);
   }
+  add("rod", run.load ? "Cable angles" : "Rod angles", "°", [...plain("alpha_rad", "α", kDegrees), ...plain("beta_rad", "β", kDegrees)]);
+  add("force", "Force", "N", ["x", "y", "z"].flatMap((axis) => plain(`force_${axis}_n`, axis)));
+  const attitude = (prefix: string): Series[] => {
+    const places = ["w", "x", "y", "z"].map((axis) => columns.find(`${prefix}${axis}`));
+    if (!places.every((place) => place >= 0)) return [];
+    const [w, x, y, z] = places as [number, number, number, number];
+    return ["roll", "pitch", "yaw"].map((label, index) => ({
+      label,
+      calc: (row: Float32Array) => calcEuler(row[w]!, row[x]!, row[y]!, row[z]!)[index]! * kDegrees,
+    }));
+  };
+  if (run.has_attitude) add("attitude", "Attitude", "°", attitude("att_"));
+  if (run.load && run.load.outline_m.length > 0) add("load_attitude", "Load attitude", "°", attitude("load_att_"));
   const rotors = run.columns.filter(({ name }) => /^rotor_\d+_rad_s$/.test(name));
   add("rotors", "Rotors", "rad/s", rotors.slice(0, 8).flatMap(({ name }) => plain(name, name.split("_")[1]!)));
   add("speed", "Load velocity", "m/s", ["x", "y", "z"].flatMap((axis) => plain(`load_v${axis}_m_s`, axis)));

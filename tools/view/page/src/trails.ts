@@ -1,5 +1,6 @@
 /** Trails of quadrotors and loads: one buffer of line segments for all vehicles, of bounded length. */
 import { BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, LineBasicMaterial, LineSegments } from "three";
+import { findLoad, hasLoad } from "./cables";
 import { kLoadColour, kQuadColour } from "./colours";
 import { toScene } from "./frames";
 import type { Pose, Run, RunIndex, Trail } from "./types";
@@ -20,7 +21,10 @@ export class Trails {
   private filled = 0; // slots that have ever been written
   private lastTime = NaN;
 
-  constructor(run: Run, index: RunIndex) {
+  constructor(
+    private readonly run: Run,
+    index: RunIndex,
+  ) {
     const count = Math.max(1, run.vehicles.length);
     run.vehicles.forEach(({ id }, place) => this.places.set(id, place));
     this.slots = Math.min(kMostSlots, Math.max(60, Math.floor(kMostSegments / 2 / count)));
@@ -55,8 +59,8 @@ export class Trails {
       const at = start + place * kFloats;
       toScene(pose.quad, point);
       write(values, at, end, 0, isJump || this.next % 2 === 1); // the quadrotor's trail is dotted
-      toScene(pose.load, point);
-      write(values, at + 6, end, 3, isJump);
+      toScene(findLoad(pose, this.run), point);
+      write(values, at + 6, end, 3, isJump || !hasLoad(this.run, place));
     }
     this.filled = Math.max(this.filled, this.next + 1);
     this.lines.geometry.setDrawRange(0, (this.filled * count * kFloats) / 3);
@@ -85,7 +89,8 @@ export class Trails {
       for (const [offset, source] of [[0, trail.quad], [3, trail.load]] as const) {
         toScene([source[3 * from]!, source[3 * from + 1]!, source[3 * from + 2]!], point).toArray(end, offset);
         toScene([source[3 * from + 3]!, source[3 * from + 4]!, source[3 * from + 5]!], point);
-        write(values, at + 2 * offset, end, offset, offset === 0 && slot % 2 === 1);
+        const isGap = offset === 0 ? slot % 2 === 1 : !hasLoad(this.run, place);
+        write(values, at + 2 * offset, end, offset, isGap);
       }
     }
     this.positions.clearUpdateRanges();

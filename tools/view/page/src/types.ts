@@ -36,6 +36,19 @@ export interface Column {
   unit: string;
 }
 
+/** One load that all vehicles carry by cables; scene::LoadScene. Vectors in the load, z down. */
+export interface SharedLoad {
+  /** Of each vehicle's cable, by id. */
+  attachments_m: Record<string, Vector3>;
+  /** Corners of a rigid load, in turn around it; none: a point. */
+  outline_m: Vector3[];
+  /** From this tension on a cable has the colour `high`. */
+  full_tension_n: number;
+  ground_z_m: number | null;
+  /** Red, green, blue, 0 to 1; `low`: taut without tension. */
+  colours: Record<"slack" | "low" | "high", Vector3>;
+}
+
 /** Description of the run: describe_run of tools/view/run_description.hpp. */
 export interface Run {
   /** 16 hex digits. */
@@ -50,7 +63,9 @@ export interface Run {
   /** kColumns, then the plant's signals. */
   columns: Column[];
   stages: string[];
-  /** Planned path of the load of vehicle 0. */
+  /** Missing or null: each vehicle has its own load on a rod. */
+  load?: SharedLoad | null;
+  /** Planned path of the one load, or of the load of vehicle 0. */
   path_m: Vector3[];
 }
 
@@ -70,6 +85,16 @@ export class Columns {
   }
 }
 
+/** The cable of one vehicle at one step, and the load at its end. */
+export interface Cable {
+  tension: number;
+  length: number;
+  isTaut: boolean;
+  isReleased: boolean;
+  /** Of the load: w, x, y, z. */
+  attitude: ArrayLike<number>;
+}
+
 /** One vehicle at one step. Copy it to keep it: the arrays may be reused for the next step. */
 export interface Pose {
   vehicleId: number;
@@ -78,7 +103,10 @@ export interface Pose {
   quad: ArrayLike<number>;
   /** w, x, y, z. */
   attitude: ArrayLike<number>;
+  /** Of the load; with a cable that of the cable's end. */
   load: ArrayLike<number>;
+  /** Null: a rod. */
+  cable: Cable | null;
   /** Desired position of the load; NaN if there is none. */
   reference: ArrayLike<number>;
   /** Mean, rad/s; NaN if there is none. */

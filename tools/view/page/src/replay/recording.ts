@@ -1,5 +1,5 @@
 /** A recording as sls_view packs it (tools/view/replay/README.md): checks its bytes, gives poses at any time. */
-import { AnswerKind, Columns, type Pose, type Rows, type Run } from "../types";
+import { AnswerKind, Columns, type Cable, type Pose, type Rows, type Run } from "../types";
 
 export interface RecordedEvent {
   step: number;
@@ -115,6 +115,8 @@ export class Recording {
   readonly spacing: number;
   private readonly places: Record<"quad" | "quadV" | "load" | "loadV" | "attitude" | "reference", number>;
   private readonly rotors: number[];
+  /** Places of the columns of a cable; those that there are not have -1. */
+  private readonly cable: Record<"tension" | "length" | "taut" | "attitude" | "released", number> | null;
 
   constructor(
     readonly head: Head,
@@ -141,6 +143,9 @@ export class Recording {
       attitude: find("att_w"),
       reference: find("ref_x_m"),
     };
+    const [tension, length, taut, attitude, released] = ["cable_tension_n", "cable_length_m", "cable_taut", "load_att_w",
+      "cable_released"].map((name) => this.columns.find(name)) as [number, number, number, number, number];
+    this.cable = head.run.load ? { tension, length, taut, attitude, released } : null;
     this.rotors = head.run.columns.flatMap(({ name }, place) => (/^rotor_\d+_rad_s$/.test(name) ? [place] : []));
   }
 
@@ -184,6 +189,7 @@ export class Recording {
       kind: this.findKind(vehicleId, time),
       quad: calcBetween(values, a, b, quad, quadV, u, span),
       load: calcBetween(values, a, b, load, loadV, u, span),
+      cable: this.findCable(values, a, b, u),
       attitude: calcAttitude(values.subarray(a + attitude, a + attitude + 4), values.subarray(b + attitude, b + attitude + 4), u),
       reference: [0, 1, 2].map((axis) => mix(values[a + reference + axis]!, values[b + reference + axis]!, u)),
       rotorRate: this.calcRotorRate(values, a),
@@ -196,6 +202,18 @@ export class Recording {
     for (const stage of this.head.stage_starts)
       if (stage.vehicle === vehicleId && stage.sim_time_s <= time + 1e-9) name = stage.name;
     return name;
+  }
+
+  private findCable(values: Float32Array, a: number, b: number, u: number): Cable | null {
+    if (!this.cable || this.cable.tension < 0) return null;
+    const { tension, length, taut, attitude, released } = this.cable;
+    return {
+      tension: mix(values[a + tension]!, values[b + tension]!, u),
+      length: mix(values[a + length]!, values[b + length]!, u),
+      isTaut: values[a + taut] === 1,
+      isReleased: released >= 0 && values[a + released] === 1,
+      attitude: calcAttitude(values.subarray(a + attitude, a + attitude + 4), values.subarray(b + attitude, b + attitude + 4), u),
+    };
   }
 
   private calcRotorRate(values: Float32Array, row: number): number {

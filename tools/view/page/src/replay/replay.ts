@@ -1,4 +1,5 @@
 /** The page for one or two recordings: from sls_view, or from the page itself. */
+import { findLoad } from "../cables";
 import { find, make, setText } from "../dom";
 import { showBanner, showLines, showPhase, showRun, showStage, showTime } from "../panels";
 import { makeShell, type Shell } from "../shell";
@@ -231,6 +232,7 @@ class Replay {
       slsView: {
         projection: (vehicleId: number) => scene?.projection(vehicleId) ?? null,
         camera: () => scene?.camera() ?? null,
+        cable: (vehicleId: number) => scene?.cable(vehicleId) ?? null,
         frames: () => scene?.frames() ?? 0,
         fps: () => scene?.fps() ?? 0,
         seek: (time: number) => {
@@ -279,7 +281,9 @@ function makeTrail(recording: Recording, vehicleId: number, time: number): Trail
   for (let row = first; row <= last; row += stride) {
     const at = row * rows.columns;
     quad!.push(...rows.values.subarray(at + quadAt, at + quadAt + 3));
-    load!.push(...rows.values.subarray(at + loadAt, at + loadAt + 3));
+    load!.push(...(recording.run.load
+      ? Array.from(findLoad(recording.poseAt(vehicleId, rows.time[row]!), recording.run))
+      : rows.values.subarray(at + loadAt, at + loadAt + 3)));
   }
   return { quad: quad!, load: load! };
 }
