@@ -38,7 +38,7 @@ def to_range(key):
 def to_default(key):
     if key["presence"] == "required":
         return "required"
-    if key["presence"].startswith("one of "):
+    if key["presence"].startswith("one of ") and not key["default"]:  # an optional key of one alternative has one
         parts = [" and ".join(f"`{name}`" for name in part.split("+")) for part in key["presence"][7:].split(", ")]
         return "exactly one of " + ", ".join(parts)
     if key["default_words"]:
