@@ -295,7 +295,8 @@ def draw_columns(all_axes: Sequence[Axes], flights: Sequence[Trajectory],
 
 
 def plot_angles(flights: Sequence[Trajectory]) -> Figure:
-    figure, axes = make_stack(2, "Cable angles" if flights[0].cable else "Rod angles", ("α about x (°)", "β about y (°)"))
+    title = "Cable angles" if flights[0].cable else "Rod angles"
+    figure, axes = make_stack(2, title, ("α about x (°)", "β about y (°)"))
     draw_columns(axes[:, 0], flights,
                  lambda flight: np.degrees(np.column_stack([flight.alpha, flight.beta])), LOAD)
     return figure
@@ -423,8 +424,8 @@ def plot_cables(flights: Sequence[Trajectory]) -> Figure:
             axes[2, 0].broken_barh([(begin, end - begin) for begin, end in spans], (index - 0.35, 0.7), **look)
     axes[1, 0].set_title("wide and light: the distance of its ends", loc="left")
     axes[2, 0].set_title("coloured: slack; hatched: cut", loc="left")
-    axes[2, 0].set(yticks=range(len(flights)), yticklabels=[flight.name if len(flights) > 1 else "" for flight in flights],
-                   ylim=(len(flights) - 0.5, -0.5))
+    names = [flight.name for flight in flights] if len(flights) > 1 else [""]
+    axes[2, 0].set(yticks=range(len(flights)), yticklabels=names, ylim=(len(flights) - 0.5, -0.5))
     mark_stages(axes[:2, 0], flights)
     return figure
 

@@ -20,8 +20,8 @@ from sls.tables import format_error, list_error_cells, list_step_cells
 CAPTIONS = {
     "fleet": "All vehicles: the paths of their loads from above, and how far each load is from its "
              "reference.",
-    "team": "The paths of all vehicles and, orange, of the centre of the load they carry, from above; and how far the ends of "
-            "their cables are from their references.",
+    "team": "The paths of all vehicles and, orange, of the centre of the load they carry, from above; and how far the "
+            "ends of their cables are from their references.",
     "positions": "Load and quadrotor over time, and where the load should be. The axis of z points "
                  "down, as z does; dotted lines: a stage begins.",
     "errors": "Load position minus reference: as it is, and its size, on a logarithmic axis unless it is always 0.",
