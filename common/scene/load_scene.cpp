@@ -6,6 +6,7 @@
 
 #include "common/config/config_error.hpp"
 #include "common/config/scenario.hpp"
+#include "common/model/math.hpp"
 
 namespace sls::scene {
 namespace {
@@ -23,20 +24,30 @@ Points sort_around(Points points) {
   const Eigen::Matrix3d axes =
       Eigen::JacobiSVD<Eigen::Matrix3Xd>(offsets, Eigen::ComputeFullU).matrixU();
   const auto calc_angle = [&](const Eigen::Vector3d& point) {
-    return std::atan2(axes.col(1).dot(point - mean), axes.col(0).dot(point - mean));
+    return math::atan2(axes.col(1).dot(point - mean), axes.col(0).dot(point - mean));
   };
   std::stable_sort(points.begin(), points.end(),
                    [&](const auto& a, const auto& b) { return calc_angle(a) < calc_angle(b); });
   return points;
 }
 
+double sinh(double x) {
+  const double m = math::expm1(x);
+  return 0.5 * (m + m / (m + 1.0));
+}
+double cosh(double x) {
+  const double m = math::expm1(x);
+  return 1.0 + 0.5 * m * m / (m + 1.0);
+}
+double asinh(double x) { return std::copysign(math::log(std::abs(x) + std::sqrt(x * x + 1.0)), x); }
+double atanh(double x) { return 0.5 * math::log((1.0 + x) / (1.0 - x)); }
+
 /// x > 0 with sinh(x) / x = ratio, for ratio > 1. Newton's method from above the root, where the
 /// function is convex.
 double invert_sinh_ratio(double ratio) {
-  double x = ratio < 3.0 ? std::sqrt(6.0 * (ratio - 1.0))
-                         : std::log(2.0 * ratio) + 1.2 * std::log(std::log(2.0 * ratio));
-  for (int i = 0; i < 20; ++i)
-    x -= (std::sinh(x) - ratio * x) / std::max(std::cosh(x) - ratio, 1e-300);
+  const double size = math::log(2.0 * ratio);
+  double x = ratio < 3.0 ? std::sqrt(6.0 * (ratio - 1.0)) : size + 1.2 * math::log(size);
+  for (int i = 0; i < 20; ++i) x -= (sinh(x) - ratio * x) / std::max(cosh(x) - ratio, 1e-300);
   return x;
 }
 
@@ -109,8 +120,8 @@ Points calc_hanging_points(const Eigen::Vector3d& from, const Eigen::Vector3d& t
   const double ratio = std::sqrt(std::max(length * length - rise * rise, 0.0)) / width;
   if (!(ratio > 1.0 + 1e-9)) return {from, to};
   const double a = 0.5 * width / invert_sinh_ratio(ratio);
-  const double x_0 = 0.5 * width - a * std::atanh(rise / length);
-  const double s_0 = -a * std::sinh(x_0 / a);  // at `from`
+  const double x_0 = 0.5 * width - a * atanh(rise / length);
+  const double s_0 = -a * sinh(x_0 / a);  // at `from`
   constexpr int kParts = kHangingPoints - 1;
   // The point next to the lowest one is moved there, if it is between the ends.
   const double place = -s_0 / length * kParts;
@@ -119,7 +130,7 @@ Points calc_hanging_points(const Eigen::Vector3d& from, const Eigen::Vector3d& t
   Points points = {from};
   for (int i = 1; i < kParts; ++i) {
     const double s = i == lowest ? 0.0 : s_0 + length * i / kParts;
-    const double part = (x_0 + a * std::asinh(s / a)) / width;
+    const double part = (x_0 + a * asinh(s / a)) / width;
     const double height = std::sqrt(a * a + s * s) - std::sqrt(a * a + s_0 * s_0);
     points.emplace_back(from.x() + part * along.x(), from.y() + part * along.y(),
                         from.z() - height);

@@ -230,7 +230,7 @@ TEST_F(DoctorTest, NamesSegmentsThatAKilledProcessLeft) {
           file, std::filesystem::file_time_type::clock::now() - std::chrono::minutes(1));
     return !std::filesystem::is_empty(memory_.path());
   }));
-  expect_findings(examine(on("here") + doctor("default")), {"shared memory"}, "1 stale segment");
+  expect_findings(examine(on("here") + doctor("default")), {"shared memory"}, "3 stale segments");
 }
 
 TEST_F(DoctorTest, NamesAProgramOfAnotherUser) {

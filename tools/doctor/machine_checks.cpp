@@ -87,7 +87,7 @@ Check check_shared_memory(const Observations& seen) {
                        name_megabytes(memory.stale_size) + ") of killed processes of " +
                        join(memory.stale_owners) +
                        " fill /dev/shm: start any program of sls as that user, which removes "
-                       "them, or run fastdds shm clean");
+                       "them");
   return ok(kName, "/dev/shm has " + name_megabytes(memory.free) + " free, and nothing stale");
 }
 
