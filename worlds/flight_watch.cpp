@@ -201,24 +201,18 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
   const Instant take_over = sync::to_duration(sync_.take_over_s);
   const Instant waited = now - published_;
   const auto before = flyers_.find(vehicle);
-  Instant due = answer->second;
-  Instant patience{0};
-  for (const auto& [name, client] : clients_) {
-    const auto& ids = client.vehicle_ids;
-    if (std::find(ids.begin(), ids.end(), vehicle) == ids.end() ||
-        !(client.order < flyer->second.order))
-      continue;
-    if (!client.is_ready) {
-      due = std::max(due, client.left);
-      continue;
-    }
-    if (client.is_refused(vehicle, record.step)) {
-      due = std::max(due, client.refused.at(vehicle));
+  // The stronger ones are awaited one after the other, each until it is refused or leaves, but not
+  // longer than this.
+  Instant given_up = published_;
+  for (const auto& [name, client] : list_stronger(flyer->second, vehicle)) {
+    if (!client.is_ready || client.is_refused(vehicle, record.step)) {
+      const Instant end = client.is_ready ? client.refused.at(vehicle) : client.left;
+      given_up = std::max(given_up, std::min(end, given_up + take_over));
       continue;
     }
     const Instant known_dead =
         std::max(client.heard, published_) + sync::kPresumedDeadAfter + kKnownAfter;
-    patience +=
+    given_up +=
         client.process->was_killed() ? std::min(take_over, known_dead - published_) : take_over;
     const bool is_known = client.ready + kKnownAfter < published_;
     if (is_known && !client.process->has_ended() && client.has_answered(vehicle, record.step) &&
@@ -233,7 +227,21 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
       find_(fmt::format("take-over: '{}' flies step {} after {:.3f} s without '{}'",
                         record.client_name, record.step, sync::to_seconds(waited), name));
   }
-  return std::max(due, published_ + patience);
+  return std::max(answer->second, given_up);
+}
+
+/// The clients of the vehicle before `flyer`, by name, the strongest first.
+std::vector<std::pair<std::string, const FlightWatch::Client&>> FlightWatch::list_stronger(
+    const Client& flyer, std::uint32_t vehicle) const {
+  std::map<decltype(flyer.order), std::string> names;
+  for (const auto& [name, client] : clients_) {
+    const auto& ids = client.vehicle_ids;
+    if (std::find(ids.begin(), ids.end(), vehicle) != ids.end() && client.order < flyer.order)
+      names.emplace(client.order, name);
+  }
+  std::vector<std::pair<std::string, const Client&>> stronger;
+  for (const auto& [order, name] : names) stronger.emplace_back(name, clients_.at(name));
+  return stronger;
 }
 
 void FlightWatch::check_policy(const model::StepRecord& record, Instant now) {

@@ -88,6 +88,8 @@ class FlightWatch {
   bool is_lockstep() const { return sync_.mode == config::SyncMode::kLockstep; }
   bool is_sound(const ControlCommand& command, std::uint64_t step) const;
   void check_take_over(const std::vector<model::StepRecord>& records, Instant now);
+  std::vector<std::pair<std::string, const Client&>> list_stronger(const Client& flyer,
+                                                                   std::uint32_t vehicle) const;
   std::optional<Instant> check_flyer(const model::StepRecord& record, Instant now);
   void check_policy(const model::StepRecord& record, Instant now);
   void check_gap(Instant now);
