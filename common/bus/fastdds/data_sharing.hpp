@@ -7,13 +7,10 @@
 #include <filesystem>
 #include <string>
 
+#include "common/bus/fastdds/shared_locks.hpp"
 #include "fastdds_api.hpp"
 
 namespace sls::bus {
-
-/// True in programs that link sls::shared_locks. In others a reader that is stopped inside a lock
-/// would stop the writer, and one that is killed there would end it.
-inline bool can_share_data = false;
 
 /// Lets an endpoint whose `policy` is automatic share data, with those processes alone that use the
 /// same /dev/shm and the same version of Fast DDS. Else, or where sharing would not work, it
