@@ -4,8 +4,6 @@
 #pragma once
 
 #include <cstdint>
-#include <filesystem>
-#include <string>
 
 #include "common/bus/fastdds/shared_locks.hpp"
 #include "fastdds_api.hpp"
