@@ -272,11 +272,12 @@ struct Node::Impl {
     transport.use_builtin_transports = false;
   }
 
-  /// Fast DDS shares no data from histories that grow.
+  /// Returns whether the endpoint will share data. Fast DDS shares none of histories that grow.
   template <class Qos>
-  void choose_data_sharing(Qos& qos) const {
-    if (bus::choose_data_sharing(qos.data_sharing(), has_memory_of_machine))
-      qos.endpoint().history_memory_policy = rtps::PREALLOCATED_MEMORY_MODE;
+  bool choose_data_sharing(Qos& qos) const {
+    if (!bus::choose_data_sharing(qos.data_sharing(), has_memory_of_machine)) return false;
+    qos.endpoint().history_memory_policy = rtps::PREALLOCATED_MEMORY_MODE;
+    return true;
   }
 
   [[noreturn]] void throw_unknown_profile(const char* profile) const {
@@ -454,11 +455,11 @@ AnyWriter::AnyWriter(Node& node, const char* topic, const char* profile, void* t
   if (!is_ok(impl_->node->publisher->get_datawriter_qos_from_profile(profile, qos)))
     node.impl().throw_unknown_profile(profile);
   if (!user_data.empty()) qos.user_data().data_vec({user_data.begin(), user_data.end()});
-  impl_->node->choose_data_sharing(qos);
+  const bool shares_data = impl_->node->choose_data_sharing(qos);
   MiddlewareLog::clear();
   impl_->writer = impl_->node->publisher->create_datawriter(dds_topic, qos, impl_.get());
   if (!impl_->writer) node.impl().throw_refused_endpoint("write", topic, profile);
-  impl_->lock.emplace(impl_->writer->guid());
+  if (shares_data) impl_->lock.emplace(impl_->writer->guid());
   impl_->node->neighbours.add_own(make_facts(*impl_->writer));
 }
 
@@ -543,12 +544,12 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   if (!is_ok(impl_->node->subscriber->get_datareader_qos_from_profile(profile, qos)))
     node.impl().throw_unknown_profile(profile);
   const auto& lifespan = qos.lifespan().duration;
-  impl_->node->choose_data_sharing(qos);
+  const bool shares_data = impl_->node->choose_data_sharing(qos);
   if (!(lifespan == kInfinite)) impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
   MiddlewareLog::clear();
   impl_->reader = impl_->node->subscriber->create_datareader(dds_topic, qos, impl_.get());
   if (!impl_->reader) node.impl().throw_refused_endpoint("read", topic, profile);
-  impl_->lock.emplace(impl_->reader->guid());
+  if (shares_data) impl_->lock.emplace(impl_->reader->guid());
   impl_->node->neighbours.add_own(make_facts(*impl_->reader));
 }
 

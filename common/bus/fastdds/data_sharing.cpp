@@ -1,11 +1,9 @@
 #include "common/bus/fastdds/data_sharing.hpp"
 
-#include <fcntl.h>
-#include <sys/file.h>
 #include <sys/stat.h>
 #include <sys/sysmacros.h>
-#include <unistd.h>
 
+#include <cstdint>
 #include <sstream>
 #include <vector>
 
@@ -21,6 +19,13 @@ constexpr bool kKeepsOrderOfStores = true;
 #else
 constexpr bool kKeepsOrderOfStores = false;
 #endif
+
+std::filesystem::path find_file(const rtps::GUID_t& endpoint) {
+  std::ostringstream file;
+  file << kSharedMemory << '/' << kDataSharingPrefix << endpoint.guidPrefix << '_'
+       << endpoint.entityId;
+  return file.str();
+}
 
 }  // namespace
 
@@ -39,19 +44,10 @@ bool choose_data_sharing(dds::DataSharingQosPolicy& policy, bool is_on_this_mach
   return true;
 }
 
-SharedDataLock::SharedDataLock(const rtps::GUID_t& endpoint) {
-  std::ostringstream file;
-  file << kSharedMemory << '/' << kDataSharingPrefix << endpoint.guidPrefix << '_'
-       << endpoint.entityId;
-  descriptor_ = ::open(file.str().c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW);
-  if (descriptor_ < 0) return;
-  ::flock(descriptor_, LOCK_SH);
+SharedDataLock::SharedDataLock(const rtps::GUID_t& endpoint)
+    : file_(find_file(endpoint)), lock_(file_, LOCK_SH) {
   struct stat state {};
-  if (::fstat(descriptor_, &state) == 0) ::fchmod(descriptor_, state.st_mode | kOwnMark);
-}
-
-SharedDataLock::~SharedDataLock() {
-  if (descriptor_ >= 0) ::close(descriptor_);
+  if (::stat(file_.c_str(), &state) == 0) ::chmod(file_.c_str(), state.st_mode | kOwnMark);
 }
 
 }  // namespace sls::bus

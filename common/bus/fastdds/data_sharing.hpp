@@ -3,8 +3,9 @@
 /// if they use shared memory (config/qos/default.xml).
 #pragma once
 
-#include <cstdint>
+#include <filesystem>
 
+#include "common/bus/fastdds/file_lock.hpp"
 #include "common/bus/fastdds/shared_locks.hpp"
 #include "fastdds_api.hpp"
 
@@ -17,17 +18,15 @@ namespace sls::bus {
 /// which a busy reader does not wait). Returns whether it shares data.
 bool choose_data_sharing(dds::DataSharingQosPolicy& policy, bool is_on_this_machine);
 
-/// Locks the shared memory of an endpoint while this object exists, so that `remove_stale_segments`
-/// does not take it for that of a killed process. Does nothing for an endpoint without any.
+/// Locks the shared memory of an endpoint that shares data while this object exists, and marks it,
+/// so that `remove_stale_segments` takes it for that of a killed process only afterwards.
 class SharedDataLock {
  public:
   explicit SharedDataLock(const rtps::GUID_t& endpoint);
-  ~SharedDataLock();
-  SharedDataLock(const SharedDataLock&) = delete;
-  SharedDataLock& operator=(const SharedDataLock&) = delete;
 
  private:
-  int descriptor_ = -1;
+  const std::filesystem::path file_;
+  const FileLock lock_;
 };
 
 }  // namespace sls::bus

@@ -1,14 +1,11 @@
 #include "common/bus/fastdds/stale_segments.hpp"
 
-#include <fcntl.h>
-#include <sys/file.h>
-#include <unistd.h>
-
 #include <chrono>
 #include <string>
 #include <string_view>
 #include <system_error>
 
+#include "common/bus/fastdds/file_lock.hpp"
 #include "fastdds_files.hpp"
 
 namespace sls::bus {
@@ -39,24 +36,6 @@ bool is_own_shared_data(const fs::directory_entry& entry) {
          (entry.status(gone).permissions() & fs::perms(kOwnMark)) != fs::perms::none;
 }
 
-/// Locks a lock file while this object exists, unless another process holds the lock.
-class Lock {
- public:
-  explicit Lock(const fs::path& file)
-      : descriptor_(::open(file.c_str(), O_RDONLY | O_CLOEXEC | O_NOFOLLOW)),
-        is_held_(descriptor_ >= 0 && ::flock(descriptor_, LOCK_EX | LOCK_NB) == 0) {}
-  ~Lock() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  Lock(const Lock&) = delete;
-  Lock& operator=(const Lock&) = delete;
-  bool is_held() const { return is_held_; }
-
- private:
-  const int descriptor_;
-  const bool is_held_;
-};
-
 enum class PortState { kFree, kInUse, kStale };
 
 PortState find_state(int port, const fs::path& folder) {
@@ -64,7 +43,7 @@ PortState find_state(int port, const fs::path& folder) {
       folder / (std::string(kSegmentPrefix) + "port" + std::to_string(port) + std::string(kLock));
   std::error_code error;
   if (!fs::exists(file, error)) return PortState::kFree;
-  return Lock(file).is_held() ? PortState::kStale : PortState::kInUse;
+  return FileLock(file, LOCK_EX).is_held() ? PortState::kStale : PortState::kInUse;
 }
 
 /// Calls `visit(segment, lock_file)` for each stale segment, while its lock is held.
@@ -79,7 +58,7 @@ void visit_stale_segments(const fs::path& folder, const Visit& visit) {
     std::error_code ignored;  // gone meanwhile, or of another user
     const auto changed = fs::last_write_time(file, ignored);
     if (ignored || fs::file_time_type::clock::now() - changed < kCreationTime) continue;
-    if (const Lock lock(file); lock.is_held())
+    if (const FileLock lock(file, LOCK_EX); lock.is_held())
       visit(is_shared_data ? file : folder / name.substr(0, name.size() - kLock.size()), file);
   }
 }
