@@ -8,6 +8,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "common/bus/fastdds/stale_segments.hpp"
 #include "fastdds_files.hpp"
 
 namespace sls::test {
@@ -61,14 +62,17 @@ void Process::kill() {
 std::vector<std::filesystem::path> find_shared_memory(pid_t id) {
   namespace fs = std::filesystem;
   // Fast DDS holds a lock file NAME_el open for its own segment NAME. The ports are not
-  // among them: other processes have them open, and the next process takes them over.
+  // among them: other processes have them open, and the next process takes them over. The
+  // files of its shared data are open, too (common/bus/fastdds/data_sharing.hpp).
   const std::string prefix = std::string("/dev/shm/") + bus::kSharedMemoryPrefix, suffix = "_el";
+  const std::string shared = std::string("/dev/shm/") + bus::kDataSharingPrefix;
   std::vector<fs::path> own;
   for (const auto& descriptor : fs::directory_iterator("/proc/" + std::to_string(id) + "/fd")) {
     std::error_code gone;
     const std::string name = fs::read_symlink(descriptor, gone).string();
     const bool is_lock = name.rfind(prefix, 0) == 0 && name.rfind(prefix + "port", 0) != 0 &&
                          name.compare(name.size() - suffix.size(), suffix.size(), suffix) == 0;
+    if (name.rfind(shared, 0) == 0) own.push_back(name);
     if (is_lock) own.insert(own.end(), {name, name.substr(0, name.size() - suffix.size())});
   }
   return own;
