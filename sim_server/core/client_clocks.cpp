@@ -59,8 +59,9 @@ std::vector<std::string> ClientClocks::look(const std::vector<sync::Member>& con
   std::map<bus::PeerId, Clock> present;
   is_any_wrong_ = false;
   for (const sync::Member& client : controllers) {
+    const auto known = clocks_.find(client.peer);
     Clock& clock = present[client.peer];
-    if (const auto known = clocks_.find(client.peer); known != clocks_.end()) clock = known->second;
+    clock = known != clocks_.end() ? known->second : Clock{{}, now, false};
     const bool is_quiet = now - clock.noted > kMeasured;
     if (is_quiet) clock.offset = ClockOffset();
     const auto offset = clock.offset.offset();
@@ -69,10 +70,8 @@ std::vector<std::string> ClientClocks::look(const std::vector<sync::Member>& con
     const bool is_wrong = offset ? std::chrono::abs(*offset) > limit : clock.is_wrong;
     if (is_wrong != std::exchange(clock.is_wrong, is_wrong))
       news.push_back(describe(client, *offset, is_wrong));
-    const bool has_fallen_silent = is_quiet && clock.noted != sync::Time();
-    is_any_wrong_ =
-        is_any_wrong_ || is_wrong ||
-        (!offset && (client.age > lifespan || (has_fallen_silent && !client.is_repeated)));
+    is_any_wrong_ = is_any_wrong_ || is_wrong ||
+                    (!offset && (client.age > lifespan || (is_quiet && !client.is_repeated)));
   }
   clocks_ = std::move(present);
   return news;

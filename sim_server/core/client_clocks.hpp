@@ -26,7 +26,7 @@ class ClientClocks {
   void note(const CommandSample& sample, std::uint64_t step);
 
   /// Compares the clocks of `controllers` with ours. Returns what is to be announced: a clock that
-  /// is wrong, or agrees again. Where old announcements suggest a wrong clock, or a client falls
+  /// is wrong, or agrees again. Where old announcements suggest a wrong clock, or a client is
   /// silent that does not repeat them, no answer may arrive that would show it.
   std::vector<std::string> look(const std::vector<sync::Member>& controllers,
                                 std::chrono::nanoseconds lifespan, sync::Time now);
@@ -36,7 +36,7 @@ class ClientClocks {
  private:
   struct Clock {
     ClockOffset offset;
-    sync::Time noted{};
+    sync::Time noted{};  // when it last answered, or else was first seen
     bool is_wrong = false;
   };
 

@@ -1,4 +1,4 @@
-/// What shared_locks.cpp tells the programs that link it. No Fast DDS here.
+/// Tells whether this program links shared_locks.cpp. No Fast DDS here.
 #pragma once
 
 namespace sls::bus {
