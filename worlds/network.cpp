@@ -157,6 +157,7 @@ void Network::leave(Peer& peer, bool with_goodbye) {
   for (const auto& other : peers_) {
     if (&other->process() == &peer.process() || other->process().has_ended()) continue;
     const bool is_heard = with_goodbye && !is_lost(peer, *other);
+    if (!is_heard) missed_leaves_.insert({other->id(), peer.id()});
     const Instant delay = is_heard ? draw_delay(peer, *other) : kLease;
     timeline_.after(delay, [this, &peer, other = other.get()] {
       other->process().run([this, &peer, other] { forget(*other, peer); });

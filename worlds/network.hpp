@@ -180,6 +180,10 @@ class Network {
   Peer* find(const bus::PeerId& id) const;
   /// Since when both know each other and nothing is cut between them; nothing if that is not so.
   std::optional<Instant> find_connected_since(const bus::PeerId& a, const bus::PeerId& b) const;
+  /// True if `observed` has left, and its goodbye to `observer` was lost.
+  bool has_missed_leave(const bus::PeerId& observer, const bus::PeerId& observed) const {
+    return missed_leaves_.count({observer, observed}) > 0;
+  }
 
  private:
   friend class Peer;
@@ -213,6 +217,7 @@ class Network {
   Random random_;
   std::vector<std::unique_ptr<Peer>> peers_;
   std::map<std::pair<const Host*, const Host*>, Link> links_;
+  std::set<std::pair<bus::PeerId, bus::PeerId>> missed_leaves_;      // observer, observed
   std::vector<std::vector<std::array<Channel, kTopics>>> channels_;  // of writer to reader
   std::uint64_t next_id_ = 1;
   std::size_t record_history_ = 5000;

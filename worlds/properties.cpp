@@ -101,7 +101,7 @@ void Properties::on_run(const Program& server, std::uint64_t run_id, const Param
   run.vehicle_ids = sync::list_vehicle_ids(parameters);
 }
 
-void Properties::on_yielded(const Program& server, std::uint64_t run_id) {
+void Properties::on_yielded(const Program& server, std::uint64_t run_id, const Network& network) {
   const Run& own = runs_[run_id];
   const auto has_won = [&](const auto& item) {
     const auto& [id, other] = item;
@@ -114,6 +114,8 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id) {
       return run.has_status && timeline_.now() - run.phase_since < kHeardWithin;
     };
     if (has_changed(other)) return true;
+    // It may count as present until its lease ends.
+    if (network.has_missed_leave(server.id(), other.server->id())) return true;
     if (has_changed(own)) return !other.has_ended;
     return progress(other) > progress(own) || (progress(other) == progress(own) && id < run_id);
   };

@@ -62,7 +62,7 @@ class Properties {
   /// The judge of a run in flight, for its server to tell what arrives and what it sends again.
   FlightWatch& flight(std::uint64_t run_id) { return *runs_.at(run_id).flight; }
   /// A server ends because another one has its vehicles.
-  void on_yielded(const Program& server, std::uint64_t run_id);
+  void on_yielded(const Program& server, std::uint64_t run_id, const Network& network);
   /// States of a step leave for the first time.
   void on_published(std::uint64_t run_id, std::uint64_t step, const config::WaitFor& expected);
   void on_recorded(std::uint64_t run_id, const std::vector<model::StepRecord>& records);

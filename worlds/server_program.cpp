@@ -113,7 +113,7 @@ void ServerProgram::end_run() {
   if (core_->end() == sim::ServerCore::End::kReset)
     return begin_run({0, false, core_->is_paused()});
   if (core_->error().find("expected no other server") != std::string::npos)
-    setting_.properties.on_yielded(*this, core_->run_id());
+    setting_.properties.on_yielded(*this, core_->run_id(), setting_.network);
   if (!core_->is_known()) return exit(1, core_->error());
   linger_.emplace(now(),
                   core_->end() == sim::ServerCore::End::kFailed ? 0 : core_->expected_recorders(),
