@@ -62,7 +62,6 @@ class Batch {
   /// The scenario of the vehicle `index` of a loop alone.
   const config::Scenario& own(std::size_t index) const { return own_[index]; }
   const std::vector<sim::Signal>& signals() const { return signals_; }
-  bool has_attitude() const { return has_attitude_; }
   /// True if the measured state can differ from the truth.
   bool can_measurement_differ() const { return can_measurement_differ_; }
 

@@ -231,11 +231,6 @@ void add_batch(py::module_& module) {
             return views;
           })
       .def_property_readonly(
-          "can_measurement_differ",
-          [](const PythonBatch& batch) { return batch.get().can_measurement_differ(); })
-      .def_property_readonly("has_attitude",
-                             [](const PythonBatch& batch) { return batch.get().has_attitude(); })
-      .def_property_readonly(
           "constants",
           [](const PythonBatch& batch) {
             const config::Scenario& scenario = batch.get().scenario();

@@ -168,9 +168,9 @@ class ClosedLoop:
         """The forces that the scenario's law answers to `state`, as `step` takes them, N: a new array.
 
         Under them a loop flies as the flight does. The law's memory and its stage of the mission advance
-        by one answer per step: call it in every step, also to fly only some of the vehicles with it. A
-        loop whose law reports an error code fails; its forces are 0. Raises ConfigError if the law cannot
-        be made."""
+        by one answer per step: call it in every step, also to fly only some of the vehicles with it. It
+        computes in one thread. A loop whose law reports an error code fails; its forces are 0. Raises
+        ConfigError if the law cannot be made."""
         return self._loops.answer()
 
     def reset(self, indices: ArrayLike | None = None, *, seeds: ArrayLike | None = None,
