@@ -111,7 +111,6 @@ Batch::Loop Batch::make_loop(const LoopStart& start) const {
   const std::vector<config::Scenario> own = make_own(changed);
   for (std::size_t i = 0; i < ids_.size(); ++i) loop.faults.emplace_back(own[i], ids_[i]);
   loop.forces.resize(ids_.size());
-  loop.seen.resize(ids_.size());
   return loop;
 }
 
@@ -210,6 +209,7 @@ void Batch::move(std::size_t index, const double* forces) {
 
 void Batch::show(std::size_t index) {
   Loop& loop = loops_[index];
+  if (can_measurement_differ_) loop.seen.resize(ids_.size());
   auto row = static_cast<Eigen::Index>(index * ids_.size());
   for (std::size_t k = 0; k < ids_.size(); ++k, ++row) {
     write_row(truth_, row, loop.plant->measurement(k));

@@ -141,7 +141,8 @@ def test_one_vehicle_of_a_group_has_a_law_in_python_and_the_others_their_own():
 
 
 def test_the_example_of_a_group_in_the_readme_runs():
-    example = re.search(r'    loop = sls.ClosedLoop."three_carry.*?\n(?!    )', (ROOT / "python/README.md").read_text(), re.S)[0]
+    readme = (ROOT / "python/README.md").read_text()
+    example = re.search(r'    loop = sls.ClosedLoop."three_carry.*?\n(?!    )', readme, re.S)[0]
     names = {"sls": sls}
     exec(textwrap.dedent(example), names)
     assert names["state"].step == 1000 and names["state"].load_position[0, 0, 0] > 0.05  # it was pushed
