@@ -32,7 +32,7 @@ void FlightRecorder::add(const std::vector<model::StepRecord>& steps) {
   if (step_ > 0)
     for (std::size_t i = 0; i < steps.size(); ++i)
       status_.timing.add(model::AnswerKind::kAccepted, 0);
-  if (is_status_due()) add_status(RunPhase::PHASE_RUNNING, "");
+  if (status_.is_due(Clock::now())) add_status(RunPhase::PHASE_RUNNING, "");
   recording_.flush_if_due();
 }
 

@@ -31,8 +31,7 @@ class FlightRecorder {
   /// Adds one step of all vehicles, in the order of the parameters.
   void add(const std::vector<model::StepRecord>& steps);
 
-  /// True if the next status sample is due, before which remarks must be announced.
-  bool is_status_due() const { return status_.is_due(Clock::now()); }
+  /// Adds remarks, dated at the last step that was added.
   void announce(const std::vector<std::string>& remarks);
 
   /// Ends the recording after the end of the flight; `failure` is empty if the missions were

@@ -20,10 +20,10 @@ FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& op
   const plugin::LastWords words(
       [&recorder](const std::string& reason) { recorder.interrupt(reason); });
   while (app::stop_signal() == 0 && flight.fly_step()) {
-    if (recorder.is_status_due()) recorder.announce(flight.take_remarks());
     recorder.add(flight.steps());
+    recorder.announce(flight.take_remarks());
   }
-  recorder.announce(flight.take_remarks());
+  recorder.announce(flight.take_remarks());  // of a step that failed
   if (app::stop_signal() != 0) {
     recorder.interrupt("interrupted");
     return {recorder.last_step(), "interrupted", false};

@@ -33,12 +33,6 @@ bool are_equal(const LawOutput& a, const LawOutput& b) {
          are_equal(a.memory.data(), b.memory.data(), a.memory.size());
 }
 
-std::optional<CableEnd> find_cable_end(const config::Scenario& scenario, std::uint32_t vehicle_id) {
-  if (!scenario.shared_load) return {};
-  const model::SharedLoad& load = *scenario.shared_load;
-  return CableEnd{load.q_WL, load.cables.at(vehicle_id).attachment_L, load.on_ground};
-}
-
 }  // namespace
 
 struct FlightController::Parts {

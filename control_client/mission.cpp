@@ -57,6 +57,12 @@ double to_seconds(std::int64_t nanoseconds) { return static_cast<double>(nanosec
 
 }  // namespace
 
+std::optional<CableEnd> find_cable_end(const config::Scenario& scenario, std::uint32_t vehicle_id) {
+  if (!scenario.shared_load) return {};
+  const model::SharedLoad& load = *scenario.shared_load;
+  return CableEnd{load.q_WL, load.cables.at(vehicle_id).attachment_L, load.on_ground};
+}
+
 Mission::Mission(const std::vector<config::Stage>& stages, std::int64_t period_ns,
                  const std::optional<CableEnd>& end)
     : period_ns_(period_ns), end_(end) {
@@ -90,6 +96,12 @@ void Mission::calc_reference(const Stage& stage, double time, MissionProgress& p
   if (stage.attitude->turns())  // else the end is where the stage has it, to the last bit
     progress.reference =
         calc_end_reference(progress.load_reference, progress.load_attitude, end_->attachment_L);
+}
+
+model::Reference Mission::calc_reference(std::uint32_t stage, double time) const {
+  MissionProgress progress;
+  calc_reference(stages_[stage], time, progress);
+  return progress.reference;
 }
 
 MissionProgress Mission::calc_progress(std::uint64_t step, const model::Measurement& state,

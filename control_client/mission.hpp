@@ -35,6 +35,9 @@ struct CableEnd {
   std::optional<Eigen::Index> on_ground = {};  ///< the signal, of plants with a ground
 };
 
+/// That of a vehicle of `scenario`; none if it carries its load alone.
+std::optional<CableEnd> find_cable_end(const config::Scenario& scenario, std::uint32_t vehicle_id);
+
 class Mission {
  public:
   /// @throws config::ConfigError without a stage or without a positive period.
@@ -50,6 +53,9 @@ class Mission {
   /// again. The mission fails when a stage reaches its timeout.
   MissionProgress calc_progress(std::uint64_t step, const model::Measurement& state,
                                 const model::ControllerMemory& memory) const;
+
+  /// The reference `time` seconds after a stage began.
+  model::Reference calc_reference(std::uint32_t stage, double time) const;
 
   const std::string& stage_name(std::uint32_t stage) const { return stages_[stage].name; }
 

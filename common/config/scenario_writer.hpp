@@ -77,6 +77,15 @@ class MapWriter {
     }
   }
 
+  /// Leaves out an empty list that could not be read.
+  template <class Element>
+  void key(Presence, const char* name, std::vector<Element>& list, const ListRange& range) {
+    if (list.empty() && range.least > 0) return;
+    text_ += next_ + name + ":";
+    next_ = indentation_;
+    write_block(list, range);
+  }
+
   /// Optional parts of the file.
   template <class Field, class... Rule>
   void key(Presence presence, const char* name, std::optional<Field>& field, const Rule&... rule) {

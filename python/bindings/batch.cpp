@@ -33,23 +33,13 @@ py::array make_view(const Number* data, std::vector<py::ssize_t> shape, const py
   return array;
 }
 
-template <class Matrix>
-py::array make_view(const Matrix& rows, const py::object& owner) {
-  return make_view(rows.data(), {rows.rows(), rows.cols()}, py::dtype::of<double>(), owner);
-}
+py::ssize_t to_size(std::size_t size) { return static_cast<py::ssize_t>(size); }
 
-py::dict make_views(const LoopStates& states, const py::object& owner) {
-  py::dict views;
-  views["quad_position"] = make_view(states.quad_position, owner);
-  views["quad_velocity"] = make_view(states.quad_velocity, owner);
-  views["load_position"] = make_view(states.load_position, owner);
-  views["load_velocity"] = make_view(states.load_velocity, owner);
-  views["angles"] = make_view(states.angles, owner);
-  views["angle_rates"] = make_view(states.angle_rates, owner);
-  if (states.attitude.rows() == 0) return views;
-  views["attitude"] = make_view(states.attitude, owner);
-  views["body_rates"] = make_view(states.body_rates, owner);
-  return views;
+/// Shape of an array with `width` numbers for each vehicle: the axis of the vehicles is there if
+/// several move together.
+std::vector<py::ssize_t> make_shape(const Batch& batch, py::ssize_t width) {
+  if (batch.vehicles() == 1) return {to_size(batch.count()), width};
+  return {to_size(batch.count()), to_size(batch.vehicles()), width};
 }
 
 std::string describe_array(py::handle object) {
@@ -86,16 +76,24 @@ class PythonBatch {
   const Batch& get() const { return *batch_; }
 
   void step(const py::object& force) {
-    const auto count = static_cast<py::ssize_t>(batch_->count());
-    if (!py::isinstance<Numbers>(force) || py::reinterpret_borrow<py::array>(force).ndim() != 2 ||
-        py::reinterpret_borrow<py::array>(force).shape(0) != count ||
-        py::reinterpret_borrow<py::array>(force).shape(1) != 3)
-      throw config::ConfigError("force: expected a C-contiguous array of float64 of shape (" +
-                                std::to_string(count) + ", 3), got " + describe_array(force));
+    const auto shape = py::tuple(py::cast(make_shape(*batch_, 3)));
+    if (!py::isinstance<Numbers>(force) || !shape.equal(force.attr("shape")))
+      throw config::ConfigError("force: expected a C-contiguous array of float64 of shape " +
+                                py::repr(shape).cast<std::string>() + ", got " +
+                                describe_array(force));
     const double* forces = py::reinterpret_borrow<Numbers>(force).data();
     const py::gil_scoped_release release;
     const std::unique_lock lock = take_turn();
     batch_->step(forces);
+  }
+
+  Numbers answer() {
+    Numbers forces(make_shape(*batch_, 3));
+    double* const data = forces.mutable_data();
+    const py::gil_scoped_release release;
+    const std::unique_lock lock = take_turn();
+    batch_->answer(data);
+    return forces;
   }
 
   /// `values`: arrays by name, with a row for each loop in `which`. Other initial values are those
@@ -113,22 +111,25 @@ class PythonBatch {
     batch_->reset(which, starts);
   }
 
-  /// Position, velocity, acceleration, jerk and snap (each n × 3) at `times` (s, n).
+  /// Position, velocity, acceleration, jerk and snap (each n × vehicles × 3) at `times` (s, n).
   py::tuple calc_reference(const Numbers& times) const {
+    const std::size_t vehicles = batch_->vehicles();
     std::vector<Numbers> derivatives;
-    for (int i = 0; i < 5; ++i) derivatives.emplace_back(std::vector<py::ssize_t>{times.size(), 3});
+    for (int i = 0; i < 5; ++i)
+      derivatives.emplace_back(std::vector<py::ssize_t>{times.size(), to_size(vehicles), 3});
     for (py::ssize_t row = 0; row < times.size(); ++row) {
       const double time_s = times.data()[row];
       if (!(time_s >= 0.0 && time_s <= config::kMaxSeconds))
         throw config::ConfigError("time_s: expected from 0 to 1000000 s, got " +
                                   std::string(py::str(py::float_(time_s))));
-      const model::Reference reference = batch_->calc_reference(std::llround(time_s * 1e9));
-      int i = 0;
-      for (const Eigen::Vector3d* vector :
-           {&reference.position, &reference.velocity, &reference.acceleration, &reference.jerk,
-            &reference.snap})
-        Eigen::Map<Eigen::Vector3d>(
-            derivatives[static_cast<std::size_t>(i++)].mutable_data(row, 0)) = *vector;
+      for (std::size_t k = 0; k < vehicles; ++k) {
+        const model::Reference reference = batch_->calc_reference(std::llround(time_s * 1e9), k);
+        auto into = derivatives.begin();
+        for (const Eigen::Vector3d* vector :
+             {&reference.position, &reference.velocity, &reference.acceleration, &reference.jerk,
+              &reference.snap})
+          Eigen::Map<Eigen::Vector3d>((into++)->mutable_data(row, to_size(k), 0)) = *vector;
+      }
     }
     return py::make_tuple(derivatives[0], derivatives[1], derivatives[2], derivatives[3],
                           derivatives[4]);
@@ -171,6 +172,26 @@ class PythonBatch {
   const pid_t process_ = ::getpid();
 };
 
+py::dict make_views(const LoopStates& states, const py::object& owner) {
+  const Batch& batch = owner.cast<const PythonBatch&>().get();
+  py::dict views;
+  const auto add = [&](const char* name, const auto& rows) {
+    if (rows.size() > 0)
+      views[name] =
+          make_view(rows.data(), make_shape(batch, rows.cols()), py::dtype::of<double>(), owner);
+  };
+  add("quad_position", states.quad_position);
+  add("quad_velocity", states.quad_velocity);
+  add("load_position", states.load_position);
+  add("load_velocity", states.load_velocity);
+  add("angles", states.angles);
+  add("angle_rates", states.angle_rates);
+  add("attitude", states.attitude);
+  add("body_rates", states.body_rates);
+  add("signals", states.signals);
+  return views;
+}
+
 }  // namespace
 
 void add_batch(py::module_& module) {
@@ -181,6 +202,7 @@ void add_batch(py::module_& module) {
            py::arg("scenario"), py::arg("count"), py::arg("threads"), py::arg("vehicle"),
            py::arg("name"))
       .def("step", &PythonBatch::step, py::arg("force"))
+      .def("answer", &PythonBatch::answer)
       .def("reset", &PythonBatch::reset, py::arg("which"), py::arg("seeds"), py::arg("values"))
       .def("calc_reference", &PythonBatch::calc_reference, py::arg("times"))
       .def("failure",
@@ -199,7 +221,7 @@ void add_batch(py::module_& module) {
           "counters",
           [](const py::object& self) {
             const Batch& batch = self.cast<const PythonBatch&>().get();
-            const std::vector<py::ssize_t> shape{static_cast<py::ssize_t>(batch.count())};
+            const std::vector<py::ssize_t> shape{to_size(batch.count())};
             py::dict views;
             views["step"] =
                 make_view(batch.steps().data(), shape, py::dtype::of<std::uint64_t>(), self);
@@ -209,20 +231,30 @@ void add_batch(py::module_& module) {
             return views;
           })
       .def_property_readonly(
-          "can_measurement_differ",
-          [](const PythonBatch& batch) { return batch.get().can_measurement_differ(); })
-      .def_property_readonly("has_attitude",
-                             [](const PythonBatch& batch) { return batch.get().has_attitude(); })
-      .def_property_readonly("constants", [](const PythonBatch& batch) {
-        const config::Scenario& scenario = batch.get().scenario();
-        py::dict constants;
-        constants["period_s"] = static_cast<double>(scenario.sync.period_ns) / 1e9;
-        constants["force_limit_n"] = scenario.controller.force_limit_n;
-        constants["quad_mass_kg"] = scenario.vehicle.quad_mass;
-        constants["load_mass_kg"] = scenario.vehicle.load_mass;
-        constants["rod_length_m"] = scenario.vehicle.rod_length;
-        constants["gravity_m_s2"] = scenario.vehicle.gravity;
-        return constants;
+          "constants",
+          [](const PythonBatch& batch) {
+            const config::Scenario& scenario = batch.get().scenario();
+            const auto of_each = [&](double model::SlungLoadParameters::*value) -> py::object {
+              const std::size_t vehicles = batch.get().vehicles();
+              if (vehicles == 1) return py::float_(batch.get().own(0).vehicle.*value);
+              Numbers values(to_size(vehicles));
+              for (std::size_t k = 0; k < vehicles; ++k)
+                values.mutable_at(k) = batch.get().own(k).vehicle.*value;
+              return values;
+            };
+            py::dict constants;
+            constants["period_s"] = static_cast<double>(scenario.sync.period_ns) / 1e9;
+            constants["force_limit_n"] = scenario.controller.force_limit_n;
+            constants["quad_mass_kg"] = of_each(&model::SlungLoadParameters::quad_mass);
+            constants["load_mass_kg"] = of_each(&model::SlungLoadParameters::load_mass);
+            constants["rod_length_m"] = of_each(&model::SlungLoadParameters::rod_length);
+            constants["gravity_m_s2"] = scenario.vehicle.gravity;
+            return constants;
+          })
+      .def_property_readonly("signal_names", [](const PythonBatch& batch) {
+        py::list names;
+        for (const sim::Signal& signal : batch.get().signals()) names.append(signal.name);
+        return names;
       });
 }
 

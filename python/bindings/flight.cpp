@@ -2,6 +2,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -30,6 +31,19 @@ Ids list_ids(const config::Scenario& scenario, std::optional<std::uint32_t> vehi
   return {*vehicle};
 }
 
+/// The Python laws of the vehicles that `controllers` names; the scenario's law of the others.
+control::LawMaker make_mixed_law_maker(const std::map<std::uint32_t, py::object>& controllers,
+                                       bool has_attitude,
+                                       const std::shared_ptr<LawErrors>& errors) {
+  std::map<std::uint32_t, control::LawMaker> own;
+  for (const auto& [id, controller] : controllers)
+    own[id] = make_python_law_maker(controller, has_attitude, errors);
+  return [own](const control::LawSetup& setup) {
+    const auto found = own.find(setup.vehicle_id);
+    return found == own.end() ? control::make_control_law(setup) : found->second(setup);
+  };
+}
+
 std::unique_ptr<FlightTable> fly(config::Scenario scenario, const py::object& controller,
                                  std::optional<std::uint32_t> vehicle, bool check_purity) {
   scenario.sync.mode = config::SyncMode::kLockstep;  // no answer can be late in one process
@@ -47,9 +61,14 @@ std::unique_ptr<FlightTable> fly(config::Scenario scenario, const py::object& co
   const auto plants = sim::make_plants(sim::find_plant_type(scenario.plant.model), scenario, ids);
   const auto errors = std::make_shared<LawErrors>();
   options.controller_name = "python";
-  options.make_law =
-      make_python_law_maker(controller, plants.front().plant->has_attitude(), errors);
-  scenario.controller.law.name = name_controller(controller);  // for messages
+  const bool has_attitude = plants.front().plant->has_attitude();
+  if (py::isinstance<py::dict>(controller)) {
+    options.make_law = make_mixed_law_maker(controller.cast<std::map<std::uint32_t, py::object>>(),
+                                            has_attitude, errors);
+  } else {
+    options.make_law = make_python_law_maker(controller, has_attitude, errors);
+    scenario.controller.law.name = name_controller(controller);  // for messages
+  }
   // The flight holds the GIL, because the law needs it at every step. Other threads get it while
   // the law runs, as during any Python code, and at each call of the lambda below.
   try {

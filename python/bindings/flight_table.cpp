@@ -135,9 +135,8 @@ FlightTable::FlightTable(const config::Scenario& scenario, const std::vector<std
   while (flight.fly_step()) {
     if (columns_.empty()) list_columns(flight);
     for (std::size_t i = 0; i < ids.size(); ++i) keep(flight.steps()[i], i);
-    if (!timer.is_due(ids.size())) continue;
     keep_remarks(flight);
-    rest();
+    if (timer.is_due(ids.size())) rest();
   }
   if (flight.is_law_broken()) throw app::RunError(flight.failure());
   keep_remarks(flight);
@@ -292,10 +291,10 @@ bool FlightTable::save(const std::filesystem::path& folder, bool force) const {
   auto remarks = remarks_.begin();
   std::vector<StepRecord> steps(ids_.size());
   for (std::size_t row = 0; row < rows_.front().rows(); ++row) {
-    for (; remarks != remarks_.end() && remarks->row <= row; ++remarks)
-      recorder.announce(remarks->texts);
     for (std::size_t i = 0; i < ids_.size(); ++i) steps[i] = make_step(i, row);
     recorder.add(steps);
+    for (; remarks != remarks_.end() && remarks->rows <= row + 1; ++remarks)
+      recorder.announce(remarks->texts);
   }
   for (; remarks != remarks_.end(); ++remarks) recorder.announce(remarks->texts);
   return recorder.finish(failure_);

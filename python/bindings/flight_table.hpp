@@ -58,7 +58,7 @@ class FlightTable {
 
  private:
   struct Remarks {
-    std::size_t row;  // first row after the remarks
+    std::size_t rows;  // before the remarks
     std::vector<std::string> texts;
   };
 

@@ -6,13 +6,22 @@ optimisation.
     while not loop.failed.all():
         error = loop.reference().position - state.load_position
         state = loop.step(my_forces(state, error))       # (256, 3) float64
+
+Vehicles on one load fly together. Forces of the scenario's law may stand beside your own:
+
+    loop = sls.ClosedLoop("three_carry_a_triangle")
+    for _ in range(1000):
+        force = loop.law_force()                         # (1, 3, 3): loop, vehicle, axis
+        force[:, 0] += (0.1, 0, 0)                       # or your own for vehicle 0
+        state = loop.step(force)
 """
 
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -34,6 +43,8 @@ BOUNDS = {"angles": np.array([np.pi, np.pi / 2])}
 class LoopState:
     """The states of all loops, a row for each, in frame W (x forward, y right, z down).
 
+    Where several vehicles move together, what each vehicle has of its own has a second axis, of the
+    vehicles by id: (count, vehicles, 3). The load's position is then that of the own cable's end.
     The arrays are read-only and change with each step: use `copy()` to keep values.
     """
 
@@ -49,6 +60,8 @@ class LoopState:
     #: (count, 4), unit quaternion w, x, y, z, body to W; None if the plant has no attitude
     attitude: NDArray[np.float64] | None = None
     body_rates: NDArray[np.float64] | None = None  #: (count, 3), in the body frame, rad/s; or None
+    #: (count,) each: the plant's signals by name, such as `load_att_w`; empty if it has none
+    signals: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,15 +81,17 @@ class ClosedLoop:
     A loop equals, bit for bit, the flight whose controller answers the same forces, for any number
     of loops and threads. The GIL is free while the loops move.
 
+    A loop has one vehicle, or all of a plant that moves them together (`cables`).
+
     A loop fails if the server would refuse its force (not finite, or larger than `force_limit_n`),
     or if its plant cannot continue. It then keeps its state until its reset; no exception is raised.
     """
 
     period_s: float  #: control period: each force is held for this time
     force_limit_n: float  #: `controller.force_limit_n`
-    quad_mass_kg: float
-    load_mass_kg: float
-    rod_length_m: float
+    quad_mass_kg: float | NDArray[np.float64]  #: (vehicles,) if several move together; so are the next two
+    load_mass_kg: float | NDArray[np.float64]
+    rod_length_m: float | NDArray[np.float64]
     gravity_m_s2: float
 
     def __init__(self, scenario: Scenario | str | os.PathLike[str], count: int = 1, *,
@@ -86,7 +101,8 @@ class ClosedLoop:
         threads: number of threads for a step; None: limited by the processors and the work.
         seeds: whole numbers ≥ 0, one for each loop, added to each seed of the scenario's faults.
             None: zeros; loops with equal forces are then equal.
-        vehicle: id in the scenario's fleet; every loop flies this vehicle.
+        vehicle: id in the scenario's fleet; every loop flies this vehicle. Vehicles that move together
+            are flown together.
         Raises ConfigError, also if the scenario cannot be read.
         """
         self._count = to_whole("count", count, 1, 10_000_000)
@@ -98,11 +114,16 @@ class ClosedLoop:
         for name, value in self._loops.constants.items():
             setattr(self, name, value)
         counters = self._loops.counters
-        self._state = LoopState(**self._loops.measured, **counters)
-        self._truth = LoopState(**self._loops.truth, **counters)
+        self._state = self._make_state(self._loops.measured, counters)
+        self._truth = self._make_state(self._loops.truth, counters)
         self._seeds = np.zeros(self._count, np.uint64)
         if seeds is not None:
             self.reset(seeds=seeds)
+
+    def _make_state(self, rows: dict[str, NDArray[np.float64]], counters: dict[str, Any]) -> LoopState:
+        signals = rows.pop("signals", None)
+        return LoopState(**rows, **counters, signals={
+            name: signals[..., place] for place, name in enumerate(self._loops.signal_names)})
 
     def __len__(self) -> int:
         return self._count
@@ -129,17 +150,28 @@ class ClosedLoop:
     def step(self, force: ArrayLike) -> LoopState:
         """Moves each loop over one control period, with its row of `force` held constant.
 
-        force: (count, 3), a list or a C-contiguous array of float64, on the quadrotor in W, N. Hovering
-            needs −(quad_mass_kg + load_mass_kg) × gravity_m_s2 along z. Rows of failed loops are ignored.
+        force: (count, 3), a list or a C-contiguous array of float64, on the quadrotor in W, N; of vehicles
+            that move together (count, vehicles, 3). Hovering needs −(quad_mass_kg + load_mass_kg) ×
+            gravity_m_s2 along z. Rows of failed loops are ignored.
         Returns `state`. Raises ConfigError for another array.
         """
         if isinstance(force, (list, tuple)):
             try:
                 force = np.array(force, np.float64)
             except (TypeError, ValueError):
-                raise ConfigError(f"force: expected numbers of shape ({self._count}, 3), got {force!r:.60}") from None
+                raise ConfigError(f"force: expected numbers of shape {self._state.quad_position.shape}, "
+                                  f"got {force!r:.60}") from None
         self._loops.step(force)
         return self._state
+
+    def law_force(self) -> NDArray[np.float64]:
+        """The forces that the scenario's law answers to `state`, as `step` takes them, N: a new array.
+
+        Under them a loop flies as the flight does. The law's memory and its stage of the mission advance
+        by one answer per step: call it in every step, also to fly only some of the vehicles with it. It
+        computes in one thread. A loop whose law reports an error code fails; its forces are 0. Raises
+        ConfigError if the law cannot be made."""
+        return self._loops.answer()
 
     def reset(self, indices: ArrayLike | None = None, *, seeds: ArrayLike | None = None,
               **initial: ArrayLike) -> LoopState:
@@ -150,7 +182,8 @@ class ClosedLoop:
         initial: initial values, each of shape (n, k) or (k,) for all: quad_position or
             load_position (3, m), quad_velocity (3, m/s), angles and angle_rates (2, rad, rad/s);
             for plants with attitude also attitude (4, unit quaternion) and body_rates (3, rad/s).
-            Other values are those of the scenario.
+            Other values are those of the scenario. Vehicles that move together begin as the scenario
+            says with these values in `plant.initial`.
         Returns `state`. Raises ConfigError for values that the plant refuses; no loop changes then.
         """
         which = self._to_indices(indices)
@@ -164,14 +197,15 @@ class ClosedLoop:
 
     def reference(self, time_s: ArrayLike | None = None) -> LoopReference:
         """The mission's reference `time_s` (any shape, s) after step 0; None: the present time of
-        each loop.
+        each loop. Vehicles that move together have an axis of their own: (…, vehicles, 3).
 
-        Stages follow each other by their time. A stage that ends within a radius has no known end:
+        Stages follow each other by their time. A stage that ends by a condition has no known end:
         here it is the last stage.
         """
         times = np.ascontiguousarray(self._state.time_s if time_s is None else time_s, np.float64)
         derivatives = self._loops.calc_reference(times.reshape(-1))
-        return LoopReference(*(rows.reshape(times.shape + (3,)) for rows in derivatives))
+        shape = times.shape + self._state.quad_position.shape[1:]
+        return LoopReference(*(rows.reshape(shape) for rows in derivatives))
 
     def _to_indices(self, indices: ArrayLike | None) -> NDArray[np.int64]:
         if indices is None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 import yaml
 
+from sls.closed_loop import to_whole
 from sls.columns import Columns
 from sls.core import load_core
 from sls.errors import RunError
@@ -187,17 +188,20 @@ class Flight(FlownVehicle):
 
 
 def fly(scenario: "Scenario | str | os.PathLike[str]",
-        controller: Law | LawWithMemory | None = None, *, vehicle: int | None = None,
-        check_purity: bool = False) -> Flight:
+        controller: Law | LawWithMemory | dict[int, Law | LawWithMemory] | None = None, *,
+        vehicle: int | None = None, check_purity: bool = False) -> Flight:
     """Flies a scenario in this process, bit for bit as the three programs do in lockstep.
 
-    `scenario` may also be an argument of load_scenario. `controller` replaces the scenario's law.
-    Without `vehicle` the whole fleet flies, otherwise only this vehicle. `check_purity` computes each
-    answer twice. Ctrl-C ends the flight with KeyboardInterrupt. Other Python threads can run during
-    the flight.
+    `scenario` may also be an argument of load_scenario. `controller` replaces the scenario's law; a
+    dict by vehicle id replaces that of these vehicles alone. Without `vehicle` the whole fleet flies,
+    otherwise only this vehicle. `check_purity` computes each answer twice. Ctrl-C ends the flight with
+    KeyboardInterrupt. Other Python threads can run during the flight.
 
     A mission that fails raises no exception: `failure` of the flight has the reason. Raises
     ConfigError if the scenario cannot be flown, RunError if the control law is broken."""
     if isinstance(scenario, (str, os.PathLike)):
         scenario = load_scenario(scenario)
+    if isinstance(controller, dict):
+        for key in controller:
+            to_whole("controller: a vehicle id", key, 0, len(scenario.vehicles) - 1)
     return Flight(load_core().fly(scenario, controller, vehicle, check_purity), scenario)

@@ -4,6 +4,7 @@ import os
 import re
 import subprocess
 import sys
+import textwrap
 
 import numpy as np
 import pytest
@@ -75,6 +76,94 @@ def test_under_the_forces_of_a_flight_it_is_that_flight(name):
         assert (loop.reference(loop.state.time_s[0]).position
                 == flight.reference_position[k]).all() or name == "short"
         loop.step(np.ascontiguousarray(np.vstack([answered[k]] * 2)))
+
+
+NOISE = {"faults": [{"noise": {"on": "state", "position_m": [1e-4, 1e-4, 1e-4], "vehicle": 1}}],
+         "sensing": {"period_s": 0.006, "age_s": 0.003},
+         "mission": [{"hold": {"position_m": [0.5, 0, -1]}, "for_s": 4}]}
+SHORT_PID = {"mission": [{"hold": {"position_m": [0.5, 0, -1]}, "for_s": 2}]}
+
+
+@pytest.mark.parametrize("name, changes", [
+    ("three_carry_a_triangle", {}), ("three_carry_a_triangle", NOISE), ("rotors_carry_a_triangle", {}),
+    ("lift_and_set_down", {}), ("figure_eight_pid", SHORT_PID)], ids=lambda value: str(value)[:8])
+def test_under_its_law_a_loop_is_the_recorded_flight_of_all_vehicles(name, changes, fly_with_program):
+    """A group, one with faults, one with rotors, stages that end by conditions, a law with memory."""
+    scenario = sls.load_scenario(name, changes=changes)
+    folder, done = fly_with_program(scenario)
+    assert done.returncode == 0, done.stdout + done.stderr
+    vehicles = [sls.Recording(folder).vehicle(i) for i in range(len(scenario.vehicles))]
+    loop = sls.ClosedLoop(scenario, 2, threads=2)
+    truth = np.stack([np.column_stack([vehicle.load_position, vehicle.quad_position,
+                                       vehicle.state["alpha_dot_rad_s"]]) for vehicle in vehicles], 1)
+    signals = {key: np.stack([vehicle.state[key] for vehicle in vehicles], 1) for key in loop.state.signals}
+    forces = np.stack([np.column_stack([vehicle.command[f"force_{axis}_n"] for axis in "xyz"])
+                       for vehicle in vehicles], 1)
+    references = np.stack([np.column_stack([vehicle.reference[f"ref_{axis}_m"] for axis in "xyz"])
+                           for vehicle in vehicles], 1)
+    shape = loop.state.angles.shape[1:-1] or (1,)
+    for k in range(len(forces)):
+        force = loop.law_force()
+        assert (loop.law_force() == force).all(), "a second call in a step changes nothing"
+        for i in range(2):
+            now = np.column_stack([value[i].reshape(*shape, -1) for value in (
+                loop.truth.load_position, loop.truth.quad_position, loop.truth.angle_rates[..., :1])])
+            assert (now == truth[k]).all(), k
+            assert (force[i] == forces[k]).all(), k
+            for key, values in signals.items():
+                assert (loop.truth.signals[key][i] == values[k]).all(), (key, k)
+        if name != "lift_and_set_down":  # a stage that ends by a condition has no known end
+            assert (loop.reference().position[0] == references[k]).all(), k
+        loop.step(force)
+
+
+def damp(position, velocity):
+    """A law in plain floats: it holds the height -2 m and damps."""
+    return [-0.5 * velocity[0], -0.5 * velocity[1], -3.3614 - (position[2] + 2.0) - 0.5 * velocity[2]]
+
+
+def test_one_vehicle_of_a_group_has_a_law_in_python_and_the_others_their_own():
+    scenario = sls.load_scenario("three_carry_a_triangle", changes=NOISE)
+    flight = sls.fly(scenario, {1: lambda now: damp(now.quad_position, now.quad_velocity)})
+    loop = sls.ClosedLoop(scenario)
+    assert loop.quad_mass_kg.tolist() == [0.25] * 3
+    for k in range(len(flight)):
+        for vehicle in flight.vehicles:
+            at = loop.truth.load_position[0, vehicle.vehicle_id]
+            assert (at == vehicle.load_position[k]).all(), k
+        force = loop.law_force()
+        force[0, 1] = damp(loop.state.quad_position[0, 1].tolist(), loop.state.quad_velocity[0, 1].tolist())
+        loop.step(force)
+    assert np.abs(flight.load_position[-1] - sls.fly(scenario).load_position[-1]).max() > 0.01
+    for key in (3, -1, "1"):
+        with pytest.raises(sls.ConfigError, match="controller: a vehicle id: expected a whole number from 0 to 2"):
+            sls.fly(scenario, {key: damp})
+
+
+def test_the_example_of_a_group_in_the_readme_runs():
+    readme = (ROOT / "python/README.md").read_text()
+    example = re.search(r'    loop = sls.ClosedLoop."three_carry.*?\n(?!    )', readme, re.S)[0]
+    names = {"sls": sls}
+    exec(textwrap.dedent(example), names)
+    assert names["state"].step == 1000 and names["state"].load_position[0, 0, 0] > 0.05  # it was pushed
+
+
+def test_a_group_begins_where_its_scenario_would_with_the_values_of_a_reset():
+    changed = sls.load_scenario("three_carry_a_triangle", changes={"plant.initial.load_position_m": [1, 2, -3]})
+    loop = sls.ClosedLoop("three_carry_a_triangle", 2)
+    state = loop.reset([1], load_position=[1, 2, -3])
+    assert (state.quad_position[1] == sls.ClosedLoop(changed).state.quad_position[0]).all()
+    assert (state.quad_position[0] != state.quad_position[1]).all()
+
+
+def test_a_law_without_an_answer_fails_its_loop_as_its_flight():
+    scenario = sls.load_scenario("three_carry_a_triangle", changes={"controller.force_limit_n": 3.37})
+    loop = sls.ClosedLoop(scenario)
+    flight = sls.fly(scenario)
+    for _ in range(len(flight)):
+        loop.step(loop.law_force())
+    assert loop.reason(0) == flight.failure.replace("control_client", "python") != ""
+    assert loop.state.step == flight.last_step and not loop.law_force().any()
 
 
 def test_measured_states_differ_from_the_truth_by_the_faults_of_the_scenario():
@@ -197,10 +286,12 @@ def test_forces_may_be_lists():
     ({"threads": 0}, "threads: expected a whole number from 1 to 1024, got 0"),
     ({"count": 2, "seeds": [1]}, "seeds: expected 2 whole numbers >= 0, got int64 of shape (1,)"),
     ({"vehicle": 3}, "vehicle: expected a vehicle of the 1 in 'figure_eight', got 3"),
+    ({"scenario": "three_carry_a_triangle", "vehicle": 1},
+     "vehicle: expected 0, since the vehicles of 'three_carry_a_triangle' move together, got 1"),
 ])
 def test_bad_arguments_are_named(arguments, message):
     with pytest.raises(sls.ConfigError) as error:
-        sls.ClosedLoop(load_analytic(), **arguments)
+        sls.ClosedLoop(**{"scenario": load_analytic(), **arguments})
     assert message in str(error.value)
 
 
@@ -214,9 +305,11 @@ def test_bad_arguments_are_named(arguments, message):
     ({"quad_position": [0, 0, 0], "load_position": [0, 0, 0]}, "got both"),
     ({"attitude": [1, 0, 0, 0]}, "expected a plant whose vehicles turn, got 'analytic'"),
     ({"attitude": [2, 0, 0, 0]}, "reset: attitude: expected unit quaternions"),
+    ({"scenario": "pick_up_and_set_down", "load_position": [0, 0, 1]},
+     "plant.ground_z_m: expected at least 1, the z of the load at the start (z is down), got 0"),
 ])
 def test_a_reset_that_is_refused_changes_nothing(arguments, message):
-    loop = sls.ClosedLoop(load_analytic(), 2)
+    loop = sls.ClosedLoop(arguments.pop("scenario", load_analytic()), 2)
     loop.step(hover(loop, 2))
     with pytest.raises(sls.ConfigError) as error:
         loop.reset(**arguments)

@@ -40,6 +40,17 @@ def read_rows(file, vehicle_id):
     return {name: [row[index] for row in rows] for index, name in enumerate(header)}
 
 
+def test_remarks_of_the_plant_stand_at_the_step_in_which_they_happen(fly_with_program, tmp_path):
+    flight = sls.fly(sls.load_scenario("aggressive_slack", changes={"mission.0.for_s": 2}))
+    flight.save(tmp_path / "saved")
+    for folder in (fly_with_program(flight.scenario)[0], tmp_path / "saved"):
+        with open(folder / "status.csv", newline="") as lines:
+            steps = {row["reason"][11:21]: int(row["step"]) for row in csv.DictReader(lines)}
+        for kind, is_taut in (("cable slac", 0), ("cable taut", 1)):
+            after = steps[kind]
+            assert flight.state["cable_taut"][after - 1:after + 1].tolist() == [1 - is_taut, is_taut], kind
+
+
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_a_flight_has_the_columns_of_the_programs_files(name, fly_with_program, tmp_path):
     base, changes = SCENARIOS[name]

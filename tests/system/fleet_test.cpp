@@ -168,31 +168,57 @@ TEST_F(FleetTest, AKilledClientOfOneHalfIsReplacedByAStandbyAndNothingElseChange
   for (const char* id : {"0", "1", "2"}) EXPECT_EQ(last_client[id], "standby") << id;
 }
 
-TEST_F(FleetTest, OneOfThreeClientsThatCarryALoadDiesAndNoByteChanges) {
-  const std::string file = scenario("one_controller_dies");
-  const auto recorder = start("recorder", {"--out", recording()});
-  const auto server = start("sim_server", {"--scenario", file, kManySteps[0], kManySteps[1]});
+/// Vehicles on one load, each with a client of its own, and the network.
+struct Group {
+  const char* scenario;
+  bool is_lossy;
+};
+
+class GroupTest : public FleetTest, public ::testing::WithParamInterface<Group> {};
+
+TEST_P(GroupTest, AClientDiesAndNoByteChanges) {
+  const std::string file = scenario(GetParam().scenario);
+  const std::string qos_file = GetParam().is_lossy ? qos("udp") : "";
+  const auto run = [&](const char* name, std::vector<std::string> flags) {
+    std::vector<std::string> command = make_command(name, domain_.number(), flags, qos_file);
+    if (GetParam().is_lossy)
+      command.insert(command.begin(), {"env", std::string("LD_PRELOAD=") + SLS_DROP_SHIM,
+                                       "SLS_DROP_PERCENT=5", "SLS_DROP_SEED=1"});
+    return std::make_unique<Process>(command);
+  };
+  const auto recorder = run("recorder", {"--out", recording()});
+  const auto server = run("sim_server", {"--scenario", file, kManySteps[0], kManySteps[1]});
   std::vector<std::unique_ptr<Process>> clients;
-  for (const char* vehicle : {"0", "1", "2"})
-    clients.push_back(start("control_client", {"--scenario", file, "--vehicles", vehicle, "--name",
-                                               std::string("of-") + vehicle, "--strength", "2"}));
-  const auto standby = start("control_client", {"--scenario", file, "--vehicles", "1", "--name",
-                                                "standby", "--strength", "1"});
+  const std::size_t count = config::load_scenario(file).vehicles.size();
+  const std::string last = std::to_string(count - 1);
+  for (std::size_t id = 0; id < count; ++id)
+    clients.push_back(
+        run("control_client", {"--scenario", file, "--vehicles", std::to_string(id), "--name",
+                               "of-" + std::to_string(id), "--strength", "2"}));
+  clients.push_back(run("control_client", {"--scenario", file, "--vehicles", last, "--name",
+                                           "standby", "--strength", "1"}));
   const auto has_grown = [&] {
     return fs::exists(recording() + "/state.csv") &&
            fs::file_size(recording() + "/state.csv") > 100'000;
   };
   ASSERT_TRUE(wait_until(has_grown)) << server->output();
-  clients[1]->kill();
+  clients[count - 1]->kill();
+  clients.erase(clients.end() - 2);
   EXPECT_EQ(server->wait(), 0) << server->output();
   EXPECT_EQ(recorder->wait(), 0) << recorder->output();
-  EXPECT_EQ(clients[0]->wait(), 0) << clients[0]->output();
-  EXPECT_EQ(clients[2]->wait(), 0) << clients[2]->output();
-  EXPECT_EQ(standby->wait(), 0) << standby->output();
-  EXPECT_TRUE(holds(server->output(), "'standby' takes over from 'of-1' (vehicle 1)"))
+  for (const auto& client : clients) EXPECT_EQ(client->wait(), 0) << client->output();
+  EXPECT_TRUE(holds(server->output(), "'standby' takes over from 'of-" + last + "'"))
       << server->output();
   expect_undisturbed(recording(), file, kManySteps);
 }
+
+INSTANTIATE_TEST_SUITE_P(FleetTest, GroupTest,
+                         ::testing::Values(Group{"one_controller_dies", false},
+                                           Group{"aggressive_slack", false},
+                                           Group{"lift_and_set_down", false},
+                                           Group{"rotors_carry_a_triangle", false},
+                                           Group{"two_carry_a_bar", true}),
+                         [](const auto& flown) { return std::string(flown.param.scenario); });
 
 TEST_F(FleetTest, VehiclesThatAreNotInTheScenarioAreRefused) {
   const std::string file = make_fleet_scenario(folder_);

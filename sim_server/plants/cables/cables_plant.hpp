@@ -34,7 +34,7 @@ class CablesPlant : public Plant {
   std::vector<std::string> take_remarks(std::size_t vehicle) override;
 
  private:
-  explicit CablesPlant(const PlantSetup& setup, const cables::Start& start);
+  CablesPlant(const PlantSetup& setup, const cables::Start& start);
   /// A change of a cable that the scenario plans.
   struct Change {
     double time;  ///< s

@@ -3,7 +3,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <fstream>
+#include <regex>
 
 #include "tests/common/config/support.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -111,6 +113,34 @@ TEST(InvalidTextTest, LineIsTheOneOfTheMistakeAlsoInMapsOverSeveralLines) {
                    "  initial:\n    load_position_m:\n      - 0\n      - x\n      - 0");
   EXPECT_EQ(find_error(text),
             "file:11: plant.initial.load_position_m[1]: expected a number, got x");
+}
+
+TEST(InvalidTextTest, EachNumberOfAGroupIsRefusedWithItsLineIfItIsNone) {
+  const std::regex number(R"([ \[](-?[0-9][0-9.e-]*)(?=[,\] }\n]))");
+  std::size_t judged = 0;
+  for (const std::string name : {"rotors_carry_a_triangle", "two_carry_a_bar", "winch_down",
+                                 "lift_and_set_down", "cable_cut"}) {
+    std::string text = read_text(SLS_SOURCE_DIR "/config/scenarios/" + name + ".yaml");
+    if (name == "rotors_carry_a_triangle")
+      text = replace_once(text, "model: cables\n",
+                          "model: cables\n  restitution: 0.5\n  load_rates_rad_s: [0, 0, 1]\n"
+                          "  load_inertia_products_kg_m2: [0, 0, 0]\n"
+                          "  inertia_products_kg_m2: [0, 0, 0]\n"
+                          "  disturbance_torque_n_m: [0, 0, 0]\n");
+    EXPECT_EQ(find_error(text), "no error");
+    for (std::sregex_iterator at(text.begin(), text.end(), number), end; at != end; ++at) {
+      const auto place = static_cast<std::size_t>(at->position(1));
+      if (text[text.rfind('\n', place) + 1] == '#') continue;
+      std::string broken = text;
+      broken.replace(place, static_cast<std::size_t>(at->length(1)), ".nan");
+      const std::string error = find_error(broken);
+      const auto line = 1 + std::count(text.begin(), text.begin() + at->position(1), '\n');
+      EXPECT_EQ(error.rfind("file:" + std::to_string(line) + ": ", 0), 0u) << error;
+      EXPECT_NE(error.find(", got .nan"), std::string::npos) << error;
+      ++judged;
+    }
+  }
+  EXPECT_GT(judged, 150u);
 }
 
 TEST(InvalidTextTest, LineIsRightWithCarriageReturns) {

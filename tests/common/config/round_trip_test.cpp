@@ -25,6 +25,14 @@ TEST(RoundTripTest, ShippedScenariosWrittenAndReadAreEqual) {
   }
 }
 
+TEST(RoundTripTest, ALoadOnEqualCablesNeedsNoListOfThem) {
+  std::string text = read_text(std::string(SLS_SOURCE_DIR) + "/config/scenarios/slack_drop.yaml");
+  const std::size_t from = text.find("  cables: [");
+  text.erase(from, text.find('\n', from) - from);
+  const Scenario scenario = parse_scenario(text, "file");
+  EXPECT_TRUE(are_equal(parse_scenario(to_yaml(scenario), "file"), scenario)) << to_yaml(scenario);
+}
+
 /// Changes `text` at one random place: sets or removes bytes, inserts or copies a piece, or cuts
 /// the rest off.
 void mutate(std::string& text, std::mt19937_64& random) {

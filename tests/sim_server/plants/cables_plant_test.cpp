@@ -5,6 +5,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "tests/sim_server/plants/signals.hpp"
+
 namespace sls::sim {
 namespace {
 
@@ -33,14 +35,6 @@ std::unique_ptr<Plant> make(const config::Scenario& scenario) {
   std::vector<std::uint32_t> ids;
   for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id) ids.push_back(id);
   return std::move(make_plants(find_plant_type(scenario.plant.model), scenario, ids).at(0).plant);
-}
-
-double find(const Plant& plant, std::size_t vehicle, const std::string& name) {
-  const std::vector<Signal> signals = plant.signals();
-  for (std::size_t i = 0; i < signals.size(); ++i)
-    if (signals[i].name == name)
-      return plant.measurement(vehicle).signals[static_cast<Eigen::Index>(i)];
-  throw std::out_of_range(name);
 }
 
 TEST(CablesPlantTest, EachVehicleMeasuresTheEndOfItsOwnCable) {
@@ -247,6 +241,29 @@ TEST(CablesPlantTest, TellsWhatStandsOnTheGround) {
   EXPECT_EQ(remarks[2], "cable slack" + time + "; no cable carries the load");
   EXPECT_EQ(remarks[3], "load on the ground" + time);
   EXPECT_EQ(remarks[4].substr(0, 21), "vehicle on the ground");
+}
+
+TEST(CablesPlantTest, ACableThatLiesAlongXOnTheGroundHasNoAlphaAndRisesFromIt) {
+  config::Scenario scenario = make_bar();
+  auto& keys = scenario.plant.own.edit<CablesKeys>();
+  keys.ground_z = -3.0;
+  for (CableKeys& cable : keys.cables) {
+    cable.distance = 0.5;
+    cable.beta = -0.5 * M_PI;
+  }
+  const auto plant = make(scenario);
+  const std::vector<Vector3d> rising(2, {0.0, 0.0, -6.9});  // 2 N more than 0.5 kg
+  for (int step = 0; step < 300; ++step) {
+    for (const std::size_t i : {0, 1}) {
+      const model::SlungLoadState& at = plant->measurement(i);
+      const double height = -3.0 - at.p_WQ.z();
+      ASSERT_EQ(at.rod.alpha, 0.0);
+      ASSERT_EQ(at.rod.alpha_dot, 0.0);
+      ASSERT_NEAR(at.rod.beta, -std::atan2(0.5, height), 1e-12);
+    }
+    plant->advance(rising, 1);
+  }
+  EXPECT_EQ(find(*plant, 0, "vehicle_on_ground"), 0.0);
 }
 
 TEST(CablesPlantTest, HasNoSignalsOfWhatTheScenarioHasNot) {

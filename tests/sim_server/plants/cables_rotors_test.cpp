@@ -13,6 +13,7 @@
 #include "sim_server/plants/multirotor/keys.hpp"
 #include "sim_server/plants/multirotor/multirotor_plant.hpp"
 #include "tests/sim_server/plants/plant_flights.hpp"
+#include "tests/sim_server/plants/signals.hpp"
 
 namespace sls::sim {
 namespace {
@@ -110,14 +111,6 @@ PlantSetup with_geometric(PlantSetup setup, double rate, std::int64_t period_ns)
   setup.autopilot.own = geometric::Keys{inertia * rate * rate, 2.0 * inertia * rate};
   setup.autopilot.period_ns = period_ns;
   return setup;
-}
-
-double find(const Plant& plant, std::size_t vehicle, const std::string& name) {
-  const std::vector<Signal> signals = plant.signals();
-  for (std::size_t i = 0; i < signals.size(); ++i)
-    if (signals[i].name == name)
-      return plant.measurement(vehicle).signals[static_cast<Eigen::Index>(i)];
-  throw std::out_of_range(name);
 }
 
 double calc_difference(const model::Measurement& a, const model::Measurement& b) {
