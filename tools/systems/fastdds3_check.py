@@ -94,20 +94,29 @@ def configure(folder, unpacked):
     places = {f"{path.name}_DIR": path for path in (unpacked / "usr/lib").glob("*/cmake/*")}
     flags = [f"-D{name}={path}" for name, path in places.items()]
     run(["cmake", "-G", "Ninja", "-S", tree.ROOT, "-B", build, "-DSLS_FASTDDS=3", "-DCMAKE_BUILD_TYPE=Release",
+         "-DCMAKE_UNITY_BUILD=ON",
          "-DCMAKE_CXX_FLAGS_RELEASE=-O0", f"-DFASTDDSGEN={unpacked}/usr/bin/fastddsgen", *flags], "cmake")
     return build
 
 
 def list_objects(build):
-    """The object files of what sees Fast DDS, without tests: those wait until programs are linked."""
+    """The object files of what sees Fast DDS, each with the number of its sources that do. Without tests: those wait
+    until programs are linked."""
     for entry in json.loads((build / "compile_commands.json").read_text(encoding="utf-8")):
-        source = pathlib.Path(entry["file"])
-        name = str(source.relative_to(tree.ROOT)) if source.is_relative_to(tree.ROOT) else ""
-        if "/tests/" in entry["file"]:
-            continue
-        if "/generated/" in name or name.startswith(tuple(f"{folder}/" for folder in FOLDERS)) or (
-                source.is_file() and NAMES_FAST_DDS.search(source.read_text(encoding="utf-8", errors="replace"))):
-            yield re.search(r" -o (\S+)", entry["command"])[1]
+        if "/tests/" not in entry["file"] and (count := sum(map(sees_fast_dds, list_sources(entry["file"])))):
+            yield re.search(r" -o (\S+)", entry["command"])[1], count
+
+
+def list_sources(file):
+    """The sources that a file of CMAKE_UNITY_BUILD joins, or the file itself."""
+    text = pathlib.Path(file).read_text(encoding="utf-8") if "/Unity/unity_" in file else ""
+    return [pathlib.Path(name) for name in re.findall(r'^#include "(.*)"$', text, re.MULTILINE) or [file]]
+
+
+def sees_fast_dds(source):
+    name = str(source.relative_to(tree.ROOT)) if source.is_relative_to(tree.ROOT) else ""
+    return "/generated/" in name or name.startswith(tuple(f"{folder}/" for folder in FOLDERS)) or (
+        source.is_file() and NAMES_FAST_DDS.search(source.read_text(encoding="utf-8", errors="replace")) is not None)
 
 
 def check_headers(build, objects):
@@ -128,13 +137,14 @@ def main():
     folder.mkdir(parents=True, exist_ok=True)
     try:
         build = configure(folder, unpack(folder))
-        objects = sorted(list_objects(build))
+        found = dict(sorted(list_objects(build)))
+        objects = list(found)
         run(["ninja", "-C", build, "-k", "0", *(["-j", arguments.jobs] if arguments.jobs else []), *objects], "compiling")
         check_headers(build, objects)
     except tree.Failure as failure:
         print(f"fastdds3_check: error: {failure}", file=sys.stderr)
         return 1
-    print(f"{len(objects)} files compile with Fast DDS 3")
+    print(f"{sum(found.values())} files compile with Fast DDS 3")
     return 0
 
 

@@ -231,7 +231,7 @@ def test(words: list[str]) -> NoReturn:
         which += ["--label-exclude", "slow"]
     call_script("@setup", "test_packages", "python_packages", "bench_packages", "doc_packages", "package_packages")
     call_script("@npm", ROOT / "tests/tools/view")
-    call_script("@tree", preset, folder, *(["threaded_tests"] if preset == "tsan" else []))
+    call_script("@tree", preset, folder, *{"asan": ["test_programs"], "tsan": ["threaded_tests"]}.get(preset, []))
     # The tests must not get variables that the middleware reads from the environment.
     hidden = [f"--unset={name}" for name in ("ROS_DISCOVERY_SERVER", "FASTRTPS_DEFAULT_PROFILES_FILE",
                                              "FASTDDS_DEFAULT_PROFILES_FILE", "SLS_DOMAIN")]
