@@ -38,7 +38,7 @@ C_OR_OURS = r"^libc\.|^(sim_server|control_client|recorder)$"  # which replace s
 
 # Parts of a program, by object file and function; the first that fits counts.
 PARTS = (
-    ("numbers as text", "", r"^std::to_chars|CsvFile::add\(double\)|^fmt::"),
+    ("numbers as text", "", r"^std::to_chars|CsvFile::add\(double\)|write_shortest|^fmt::"),
     ("Simbody", r"^libSimTK", ""),
     ("plant", r"^sim_server$", r"Plant::|Pendulum|^sls::math|^SimTK"),
     ("law and mission", r"^control_client$",

@@ -17,55 +17,52 @@
 
 namespace sls::sim {
 
-/// Puts entries into batches, in their order. A batch has as many as fit into a datagram.
+/// Entries in batches, in their order. A batch has as many as fit into a datagram. Entries that
+/// have been written keep their memory for later ones.
 class RecordBatches {
  public:
   /// Batches of run `run_id` have at most `max_bytes`, unless one entry is larger.
-  RecordBatches(std::size_t max_bytes, std::uint64_t run_id) : max_bytes_(max_bytes) {
-    batch_.run_id(run_id);
-  }
+  RecordBatches(std::size_t max_bytes, std::uint64_t run_id)
+      : max_bytes_(max_bytes), run_id_(run_id) {}
 
-  /// Calls `write(batch)` for each batch that is full, and for the rest of the `count` entries at
-  /// `entries`; if `is_last`, the run has no later ones, and there is a last batch in any case.
+  void add(const model::StepRecord& record);
+  /// Entries that were added since the last `clear`.
+  std::size_t count() const { return count_; }
+
+  /// Calls `write(batch)` for each batch. They count from `next_batch`, which becomes the number of
+  /// the next one. If `is_last`, the run has no later ones, and there is a last batch in any case.
   template <class Write>
-  void make(const RecordEntry* entries, std::size_t count, bool is_last, const Write& write) {
-    const std::size_t header = bus::calc_size(batch_);
-    std::size_t bytes = header;
-    for (const RecordEntry* entry = entries; entry != entries + count; ++entry) {
-      std::size_t more = bus::calc_size(*entry, bytes);
-      note_size(entry->step(), more);
-      const bool is_full = bytes + more > max_bytes_ || batch_.entries().size() == BATCH_ENTRIES;
-      if (is_full && !batch_.entries().empty()) {
-        finish(false, write);
-        bytes = header;
-        more = bus::calc_size(*entry, bytes);
-      }
-      batch_.entries().push_back(*entry);
-      bytes += more;
+  void write(std::uint64_t& next_batch, bool is_last, const Write& write) {
+    if (used_ == 0 && is_last) begin_batch();
+    for (std::size_t i = 0; i < used_; ++i) {
+      auto& [batch, entries] = batches_[i];
+      batch.entries().resize(entries);
+      batch.batch_index(next_batch++);
+      batch.is_last(is_last && i + 1 == used_);
+      write(static_cast<const RecordBatch&>(batch));
     }
-    if (!batch_.entries().empty() || is_last) finish(is_last, write);
   }
+  void clear() { used_ = count_ = 0; }
 
   /// Batches of the largest step so far.
   std::size_t batches_of_step() const { return step_bytes_ / max_bytes_ + 1; }
 
  private:
-  void note_size(std::uint64_t step, std::size_t bytes) {
-    bytes_of_step_ = step == step_ ? bytes_of_step_ + bytes : bytes;
-    step_ = step;
-    step_bytes_ = step_bytes_ > bytes_of_step_ ? step_bytes_ : bytes_of_step_;
-  }
-  template <class Write>
-  void finish(bool is_last, const Write& write) {
-    batch_.batch_index(next_batch_++);
-    batch_.is_last(is_last);
-    write(static_cast<const RecordBatch&>(batch_));
-    batch_.entries().clear();
-  }
+  struct Batch {
+    RecordBatch message;  // only the first `entries` are valid
+    std::size_t entries = 0;
+  };
 
-  const std::size_t max_bytes_;
-  RecordBatch batch_;
-  std::uint64_t next_batch_ = 0;
+  void begin_batch();
+  RecordEntry& next_entry();
+  void note_size(std::uint64_t step, std::size_t bytes);
+
+  std::size_t max_bytes_;
+  std::uint64_t run_id_;
+  std::vector<Batch> batches_;  // only the first `used_` are valid
+  std::size_t used_ = 0;
+  std::size_t bytes_ = 0;          // of the last of them
+  std::size_t count_ = 0;          // entries of all
   std::uint64_t step_ = 0;         // of the last entry
   std::size_t bytes_of_step_ = 0;  // of its entries
   std::size_t step_bytes_ = 0;     // of the largest step
@@ -107,28 +104,22 @@ class RecordStream {
  private:
   static constexpr std::size_t kManyEntries = 512;
 
-  struct Collected {
-    std::vector<RecordEntry>
-        entries;  // only the first `count` are valid; the others keep their memory for reuse
-    std::size_t count = 0;
-    std::size_t steps = 0;
-  };
-
   void work();
-  void write(const Collected& collected, bool is_last);
   void write(const RecordBatch& batch);
 
   bus::Writer<RecordBatch>& writer_;
   std::mutex mutex_;
   std::condition_variable wake_;
-  Collected collected_;    // under the mutex
-  bool is_due_ = false;    // likewise
-  bool is_ended_ = false;  // likewise
+  RecordBatches collected_;  // under the mutex
+  std::size_t steps_ = 0;    // likewise: those of its entries
+  bool is_due_ = false;      // likewise
+  bool is_ended_ = false;    // likewise
   std::atomic<bool> is_full_{false};
   std::atomic<std::uint64_t> written_{0};
   std::atomic<std::uint64_t> lost_{0};
   std::atomic<std::size_t> batches_of_step_{1};  // of the largest step so far
-  RecordBatches batches_;                        // used by the thread alone
+  RecordBatches writing_;                        // used by the thread alone
+  std::uint64_t next_batch_ = 0;                 // likewise
   bool has_given_up_ = false;                    // likewise: a batch was refused after the end
   std::thread thread_;                           // last: it uses the members above
 };

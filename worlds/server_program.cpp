@@ -70,6 +70,7 @@ void ServerProgram::begin_run(sim::ServerCore::Start start) {
                                }),
                 events_.end());
   batches_.emplace(kBatch_bytes, start.run_id);
+  next_batch_ = 0;
   states_.begin_run(start.run_id, scenario.sync.period_ns);
   const Parameters parameters =
       sim::make_parameters_message(start.run_id, vehicle_ids_, scenario, fleet->plant(), "world");
@@ -202,7 +203,7 @@ void ServerProgram::resend_states(const sim::Fleet& fleet,
 
 void ServerProgram::record_step(const sim::Fleet& fleet) {
   for (const model::StepRecord& record : fleet.records()) {
-    bus::fill(entries_.emplace_back(), record);
+    batches_->add(record);
     certificate_->add(record);
   }
   setting_.properties.on_recorded(core_->run_id(), fleet.records());
@@ -210,21 +211,20 @@ void ServerProgram::record_step(const sim::Fleet& fleet) {
   if (steps_ > 1) return;
   process_.run_at(setting_.timeline.now() + sim::RecordStream::kLongestWait,
                   [this, number = flush_number_] {
-                    if (number == flush_number_ && !entries_.empty()) write_records(false);
+                    if (number == flush_number_ && batches_->count() > 0) write_records(false);
                   });
 }
 
 void ServerProgram::record_late(const sim::Vehicle& vehicle, const sim::OfferedAnswer& offered) {
   setting_.properties.on_late(core_->run_id());
-  bus::fill(entries_.emplace_back(), sim::make_late_record(vehicle, offered));
+  batches_->add(sim::make_late_record(vehicle, offered));
 }
 
 void ServerProgram::write_records(bool is_last) {
   ++flush_number_;
-  batches_->make(entries_.data(), entries_.size(), is_last,
-                 [this](const RecordBatch& batch) { peer_.write(batch); });
-  written_ += entries_.size();
-  entries_.clear();
+  batches_->write(next_batch_, is_last, [this](const RecordBatch& batch) { peer_.write(batch); });
+  written_ += batches_->count();
+  batches_->clear();
   steps_ = 0;
 }
 

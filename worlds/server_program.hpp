@@ -51,7 +51,7 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   void record_step(const sim::Fleet& fleet) override;
   void record_late(const sim::Vehicle& vehicle, const sim::OfferedAnswer& answer) override;
   bool is_record_full() const override {
-    return entries_.size() > sim::RecordStream::kMostCollected / 2;
+    return batches_->count() > sim::RecordStream::kMostCollected / 2;
   }
   std::uint64_t lost() const override { return 0; }
   void flush_records() override { write_records(false); }
@@ -93,8 +93,8 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   std::deque<Item> outbox_;
   sim::StateSamples states_;
   std::optional<sim::RecordBatches> batches_;
-  std::vector<RecordEntry> entries_;
-  std::size_t steps_ = 0;  // of the entries
+  std::uint64_t next_batch_ = 0;
+  std::size_t steps_ = 0;  // of the entries of batches_
   std::uint64_t written_ = 0;
   std::uint64_t flush_number_ = 0;
   std::set<bus::PeerId> informed_;

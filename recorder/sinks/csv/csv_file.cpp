@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cstring>
 #include <utility>
+
+#include "recorder/sinks/csv/shortest_number.hpp"
 
 namespace sls::record {
 namespace {
@@ -15,7 +16,7 @@ constexpr std::size_t kFlushBytes = 1 << 18;  // bounds the memory between two t
 struct NumberText {
   std::uint64_t bits = 0;  // of the double
   std::size_t length = 0;
-  std::array<char, 24> letters{};  // as many as -2.2250738585072014e-308 has
+  std::array<char, kLongestNumber> letters{};
 };
 
 /// The latest texts, because flight.csv repeats the numbers of the other files.
@@ -26,9 +27,10 @@ class NumberTexts {
     std::memcpy(&bits, &number, sizeof bits);
     NumberText& text = texts_[bits * 0x9e37'79b9'7f4a'7c15 >> (64 - kIndexBits)];
     if (text.bits != bits || text.length == 0) {
-      char* const begin = text.letters.data();
-      char* const end = std::to_chars(begin, begin + text.letters.size(), number).ptr;
-      text.length = static_cast<std::size_t>(end - begin);
+      std::array<char, kNumberRoom> letters;
+      const char* const end = write_shortest(number, letters.data());
+      text.length = static_cast<std::size_t>(end - letters.data());
+      std::memcpy(text.letters.data(), letters.data(), sizeof text.letters);
       text.bits = bits;
     }
     return text;
