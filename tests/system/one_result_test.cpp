@@ -60,27 +60,6 @@ TEST_F(OneResultTest, WithFivePercentOfAllDatagramsLost) {
   EXPECT_GT(std::stoi(said.substr(at + 16)), 100) << said;
 }
 
-TEST_F(OneResultTest, PausedSteppedAndResumed) {
-  const OwnDomain domain;
-  const auto start = [&](const char* name, const std::vector<std::string>& words) {
-    return std::make_unique<Process>(make_command(name, domain.number(), words));
-  };
-  const std::string recording = folder_ / "recording";
-  const auto recorder = start("recorder", {"--out", recording});
-  const auto server = start("sim_server", {"--scenario", file_});
-  const auto control = [&](const std::vector<std::string>& words) {
-    const auto sim_ctl = start("sim_ctl", words);
-    EXPECT_EQ(sim_ctl->wait(), 0) << sim_ctl->output() << server->output();
-  };
-  control({"pause"});  // the flight begins paused
-  const auto client = start("control_client", {"--scenario", file_});
-  for (const char* steps : {"1", "1", "250"}) control({"step", steps});
-  control({"resume"});
-  for (Process* process : {server.get(), client.get(), recorder.get()})
-    EXPECT_EQ(process->wait(), 0) << process->output();
-  expect_undisturbed(recording, file_);
-}
-
 // --- sensing -------------------------------------------------------------------------------------
 
 TEST(SensingSystemTest, AFleetHasTheSameResultInProcess) {
