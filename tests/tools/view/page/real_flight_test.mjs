@@ -52,11 +52,11 @@ try {
       camera.area.left + camera.area.width / 2 + (pose[part][0] - camera.target_m[0]) * scale,
       camera.area.top + camera.area.height / 2 + (pose[part][2] - camera.target_m[2]) * scale,
     ];
-    // A line of the path or the trail may cross the body, but not most of these places on it.
+    // Lines of path, trail and reference may cross the body, but not all of these places on it.
     const places = kPlaces.map(([x, y]) => [pixel[0] + x, pixel[1] + y]);
     const colours = await readPixels(browser, png, places);
     const right = colours.filter((colour) => colour.every((value, index) => Math.abs(value - kColours[part][index]) <= kTolerance));
-    assert.ok(right.length >= 3, `${part} at ${pixel}: expected ${kColours[part]}, got ${colours.join("  ")}`);
+    assert.ok(right.length >= 2, `${part} at ${pixel}: expected ${kColours[part]}, got ${colours.join("  ")}`);
   }
   console.log("ok pixels of the real flight have the colours of quadrotor and load");
 
