@@ -32,32 +32,47 @@ try {
   await waitFor("page: paused", async () => (await state()).phase === "paused");
   console.log("ok the pause button holds the real run");
 
-  const before = flight.status().step;
-  await page.$eval("#bar input[type=number]", (field) => (field.value = "7"));
-  await press("step");
-  await waitFor("seven steps", () => flight.status().step === before + 7);
+  const stepOn = async (count) => {
+    const before = flight.status().step;
+    await page.$eval("#bar input[type=number]", (field, value) => (field.value = value), String(count));
+    await press("step");
+    await waitFor(`${count} steps`, () => flight.status().step === before + count);
+    return before + count;
+  };
+  let last = await stepOn(7);
   console.log("ok the step button lets it go seven steps");
 
   await page.click("[data-camera=side]");
   await page.click("#fit");
-  await waitFor("the paused step", async () => (await state()).step >= before + 6);
-  const frames = await page.evaluate(() => window.slsView.frames());
-  await page.evaluate(() => window.slsView.redraw());
-  await waitFor("a frame of it", async () => (await page.evaluate(() => window.slsView.frames())) > frames);
-  const [camera, pose] = await page.evaluate(() => [window.slsView.camera(), window.slsView.pose(0)]);
-  const png = await page.screenshot({ path: join(folder, "real_side.png") });
-  const scale = camera.area.height / camera.height_m;
-  for (const part of ["quad", "load"]) {
-    const pixel = [
-      camera.area.left + camera.area.width / 2 + (pose[part][0] - camera.target_m[0]) * scale,
-      camera.area.top + camera.area.height / 2 + (pose[part][2] - camera.target_m[2]) * scale,
-    ];
-    // Lines of path, trail and reference may cross the body, but not all of these places on it.
-    const places = kPlaces.map(([x, y]) => [pixel[0] + x, pixel[1] + y]);
-    const colours = await readPixels(browser, png, places);
-    const right = colours.filter((colour) => colour.every((value, index) => Math.abs(value - kColours[part][index]) <= kTolerance));
-    assert.ok(right.length >= 2, `${part} at ${pixel}: expected ${kColours[part]}, got ${colours.join("  ")}`);
+  /** The part whose colour a picture of step `last` does not show where it is; nothing if it shows both. */
+  const findMissing = async () => {
+    await waitFor("the paused step", async () => (await state()).step >= last - 1);
+    const frames = await page.evaluate(() => window.slsView.frames());
+    await page.evaluate(() => window.slsView.redraw());
+    await waitFor("a frame of it", async () => (await page.evaluate(() => window.slsView.frames())) > frames);
+    const [camera, pose] = await page.evaluate(() => [window.slsView.camera(), window.slsView.pose(0)]);
+    const png = await page.screenshot({ path: join(folder, "real_side.png") });
+    const scale = camera.area.height / camera.height_m;
+    for (const part of ["quad", "load"]) {
+      const pixel = [
+        camera.area.left + camera.area.width / 2 + (pose[part][0] - camera.target_m[0]) * scale,
+        camera.area.top + camera.area.height / 2 + (pose[part][2] - camera.target_m[2]) * scale,
+      ];
+      // A line of the path or the trail may cross the body, but not most of these places on it.
+      const places = kPlaces.map(([x, y]) => [pixel[0] + x, pixel[1] + y]);
+      const colours = await readPixels(browser, png, places);
+      const right = colours.filter((colour) => colour.every((value, index) => Math.abs(value - kColours[part][index]) <= kTolerance));
+      if (right.length < 3) return `${part} at ${pixel}: expected ${kColours[part]}, got ${colours.join("  ")}`;
+    }
+    return null;
+  };
+  // Where path, trail and reference cross, lines cover most of a body: then a later step shows it.
+  let missing = await findMissing();
+  if (missing) {
+    last = await stepOn(100);
+    missing = await findMissing();
   }
+  assert.equal(missing, null);
   console.log("ok pixels of the real flight have the colours of quadrotor and load");
 
   await press("resume");
