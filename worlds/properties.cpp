@@ -114,10 +114,11 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id, const N
       return run.has_status && timeline_.now() - run.phase_since < kHeardWithin;
     };
     if (has_changed(other)) return true;
-    // It may count as present until its lease ends.
-    if (network.has_missed_leave(server.id(), other.server->id())) return true;
-    if (has_changed(own)) return !other.has_ended;
-    return progress(other) > progress(own) || (progress(other) == progress(own) && id < run_id);
+    // Without its goodbye it counts as present, in a phase it had, until its lease ends.
+    const bool is_end_unknown = network.has_missed_leave(server.id(), other.server->id());
+    if (has_changed(own)) return is_end_unknown || !other.has_ended;
+    const int others_progress = is_end_unknown ? other.furthest : progress(other);
+    return others_progress > progress(own) || (others_progress == progress(own) && id < run_id);
   };
   if (std::none_of(runs_.begin(), runs_.end(), has_won) && killed_.empty())
     find(fmt::format(
@@ -191,6 +192,7 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
   run.has_status = true;
   run.was_paused = run.was_paused || status.phase() == RunPhase::PHASE_PAUSED;
   run.phase = status.phase();
+  run.furthest = std::max(run.furthest, sync::calc_progress(run.phase));
   run.summary.take_overs = status.counters().take_overs();
   run.summary.late = status.counters().held() + status.counters().fail_safe();
   if (status.reason().size() > 0) run.named = timeline_.now();

@@ -121,6 +121,7 @@ class Properties {
     std::string certificate;
     std::string timing;
     RunPhase phase = RunPhase::PHASE_WAITING;
+    int furthest = 0;         // progress of its furthest phase (sync::calc_progress)
     bool has_status = false;  // its claim is settled
     bool waits_for_recorders = false;
     bool has_faulty_forces = false;  // the scenario disturbs them
