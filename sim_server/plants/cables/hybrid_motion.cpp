@@ -40,6 +40,31 @@ double find_crossing(const Value& value, double low, double at_low, double high,
   return high;
 }
 
+/// A value and its derivative by time.
+struct Slope {
+  double value, rate;
+};
+
+/// When a value rises above 0, within kTimeTolerance or where it is less than `rounding`. It is
+/// that of `start` at 0, from where it can fall first, and `at_high` > 0 at `high`. Newton's method
+/// from the parabola through these, and bisection where that leaves the interval.
+template <class Find>
+double find_rise(const Find& find, const Slope& start, double high, double at_high,
+                 double rounding) {
+  const double bend = (at_high - start.value - high * start.rate) / (high * high);
+  const double root = start.rate * start.rate - 4.0 * bend * start.value;
+  double time = 0.5 * (std::sqrt(std::max(root, 0.0)) - start.rate) / bend;
+  double low = 0.0;
+  for (int i = 0; i < 150 && high - low > kTimeTolerance; ++i) {
+    if (!(time > low && time < high)) time = 0.5 * (low + high);
+    const Slope at = find(time);
+    if (at.rate > 0.0 && std::abs(at.value) <= rounding) return time;
+    (at.value > std::max(start.value, 0.0) ? high : low) = time;
+    time -= at.value / at.rate;
+  }
+  return high;
+}
+
 /// Of two lines, with value and slope at 0 and at 1, the value where they cross.
 double calc_tangents_crossing(double at_0, double slope_0, double at_1, double slope_1) {
   return at_0 + slope_0 * (at_1 - at_0 - slope_1) / (slope_0 - slope_1);
@@ -445,27 +470,38 @@ std::optional<double> HybridMotion::find_arrival(const Actions& actions, double 
     at_end = violation(until);
     if (!(at_end > tolerance)) return {};
   }
-  double from = 0.0, at_start = start;
   const bool leaves = limit.of == Limit::Of::kCable ? rate < 0.0 : rate <= 0.0;
-  if (start >= -tolerance && leaves) {
-    // It just left its limit, and comes back: begin where it is away.
-    for (from = 0.5 * until; from > kTimeTolerance; from *= 0.5)
-      if ((at_start = violation(from)) < 0.0) break;
+  const bool returns = start >= -tolerance && leaves;  // it just left its limit, and comes back
+  if (start >= 0.0 && !returns) return 0.0;
+  // By a parabola it gets away by (rate until / 2)² / at_end at most.
+  const double way = 0.5 * rate * until;
+  if (returns && rate < 0.0 && way * way <= tolerance * at_end) return 0.0;
+  if (returns || is_later_) {
+    const auto find = [&](double time) {
+      const double value = violation(time);
+      return Slope{value, calc_excess_rate(trial_, limit)};
+    };
+    return find_rise(find, {start, rate}, until, at_end, 1e-2 * tolerance);
   }
-  if (at_start >= 0.0) return 0.0;
-  return find_crossing(violation, from, at_start, until, at_end);
+  // Not so the first event of a step: the last bits of recordings depend on its search.
+  return find_crossing(violation, 0.0, start, until, at_end);
 }
 
-HybridMotion::Found HybridMotion::find_first(const Actions& actions, double h, const Instant& end) {
-  Found first;
-  const Holding middle = between_;  // a search overwrites it
+/// Flies to the first event within `h`, or to its end.
+HybridMotion::Found HybridMotion::find_first(const Actions& actions, double h) {
+  integrate(actions, h, then());
+  Holding middle = between_;  // a search overwrites it
+  Found first{h, {}};
   const auto look = [&](const Limit& limit) {
     const bool is_held = holds(limit);
     if (is_held && is_stuck_) return;
-    const auto time =
-        is_held ? find_loss(actions, h, middle, end, limit) : find_arrival(actions, h, end, limit);
-    if (time && (first.limit.of == Limit::Of::kNothing || *time < first.time))
-      first = {*time, limit};
+    const auto time = is_held ? find_loss(actions, first.time, middle, then(), limit)
+                              : find_arrival(actions, first.time, then(), limit);
+    if (!time || (first.limit.of != Limit::Of::kNothing && !(*time < first.time))) return;
+    first = {*time, limit};
+    // Later events do not count.
+    integrate(actions, first.time, then());
+    middle = between_;
   };
   for (const std::size_t i : uncut_)
     if (moves(i, mode_.standing)) look({Limit::Of::kCable, i});
@@ -580,12 +616,10 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
   }
   double time = 0.0;
   for (int count = 1;; ++count) {
-    const double rest = h - time;
-    integrate(actions, rest, then());
-    const Found found = find_first(actions, rest, then());
-    if (found.limit.of == Limit::Of::kNothing) break;
-    integrate(actions, found.time, then());
+    is_later_ = count > 1;
+    const Found found = find_first(actions, h - time);
     now_at_ = 1 - now_at_;
+    if (found.limit.of == Limit::Of::kNothing) break;
     time += found.time;
     if (holds(found.limit))
       let_go(actions, time, found.limit, events);
@@ -597,7 +631,6 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
     }
     if (time >= h) return;
   }
-  now_at_ = 1 - now_at_;
   check_held();
 }
 
