@@ -92,6 +92,15 @@ double get_fall(const Motion& motion, std::size_t body) {
   return (body == kLoad ? motion.v_WL : motion.vehicles[body].v_W).z();
 }
 
+double get_mass(const System& system, std::size_t body) {
+  return body == kLoad ? system.load_mass : system.vehicle_mass[body];
+}
+
+Members without(Members some, std::size_t one) {
+  some.remove(one);
+  return some;
+}
+
 void stop(const Members& bodies, Motion& motion) {
   for (const std::size_t body : bodies) {
     (body == kLoad ? motion.v_WL : motion.vehicles[body].v_W).setZero();
@@ -184,7 +193,6 @@ Members HybridMotion::find_touching(const Instant& instant) const {
   const double speed = instant.motion.v_WL.lpNorm<1>(), place = instant.motion.p_WL.lpNorm<1>();
   Members touching = find_candidates(uncut_, instant.geometry, kTouching * (1.0 + place),
                                      kTouching * (1.0 + speed));
-  if (mode_.standing.empty()) return touching;
   return find_moving(touching, mode_.standing);
 }
 
@@ -271,8 +279,7 @@ double HybridMotion::calc_lift(const Actions& actions, const Instant& instant,
                                std::size_t body) const {
   const double pulled = -instant.ground[body];
   if (!(pulled > 0.0)) return pulled;
-  Members standing = mode_.standing;
-  standing.remove(body);
+  const Members standing = without(mode_.standing, body);
   const System freed = hold_still(system_, standing);
   Geometry geometry;
   calc_geometry(freed, instant.motion, uncut_, geometry);
@@ -281,9 +288,8 @@ double HybridMotion::calc_lift(const Actions& actions, const Instant& instant,
       standing);
   const Motion rate =
       calc_accelerations(freed, instant.motion, geometry, act(actions, instant), candidates).rate;
-  const double mass = body == kLoad ? system_.load_mass : system_.vehicle_mass[body];
-  const double rise = body == kLoad ? -rate.v_WL.z() : -rate.vehicles[body].v_W.z();
-  return std::min(pulled, mass * rise);
+  // A rate holds accelerations where a motion holds velocities.
+  return std::min(pulled, get_mass(system_, body) * -get_fall(rate, body));
 }
 
 /// The `cables` are taut from now on, also if they push.
@@ -319,9 +325,7 @@ void HybridMotion::choose(const Actions& actions, const Members& candidates) {
 }
 
 void HybridMotion::set_free(std::size_t body) {
-  Members others = mode_.standing;
-  others.remove(body);
-  set_standing(others);
+  set_standing(without(mode_.standing, body));
   calc_geometry(held_, now().motion, uncut_, now().geometry);
 }
 
@@ -344,8 +348,7 @@ Vector HybridMotion::hit(const Members& meeting) {
     const std::size_t body = *next;
     tried.add(body);
     // The impulse with which the ground stops the body.
-    double down =
-        (body == kLoad ? system_.load_mass : system_.vehicle_mass[body]) * get_fall(before, body);
+    double down = get_mass(system_, body) * get_fall(before, body);
     double scale = std::abs(down);
     for (const std::size_t i : meeting) {
       if (body != kLoad && body != i) continue;
@@ -355,9 +358,7 @@ Vector HybridMotion::hit(const Members& meeting) {
     }
     if (!(down < -kRounding * scale)) continue;
     const Members standing = mode_.standing;
-    Members others = standing;
-    others.remove(body);
-    fly_on(others);
+    fly_on(without(standing, body));
     if (get_fall(now().motion, body) < 0.0)
       tried = {};  // it rises; the other bodies feel other impulses
     else
@@ -419,28 +420,17 @@ std::optional<double> HybridMotion::find_loss(const Actions& actions, double h,
                  rise = start - 4.0 * between + 3.0 * last;
     if (!(fall < 0.0 && rise > 0.0)) return {};
     if (!(calc_tangents_crossing(start, fall, last, rise) < -tolerance)) return {};
-    // Golden section, until a negative tension is found.
-    constexpr double kGolden = 0.6180339887498949;
-    double low = 0.0, high = h, left = h - kGolden * h, right = kGolden * h;
-    double at_left = violation(left), at_right = violation(right);
-    for (int k = 0; k < 40 && at_left <= tolerance && at_right <= tolerance; ++k) {
-      if (at_left > at_right) {
-        high = right;
-        right = left;
-        at_right = at_left;
-        left = high - kGolden * (high - low);
-        at_left = violation(left);
-      } else {
-        low = left;
-        left = right;
-        at_left = at_right;
-        right = low + kGolden * (high - low);
-        at_right = violation(right);
-      }
+    // Thirds, until a negative tension is found.
+    double low = 0.0, high = h;
+    for (int k = 0; k < 40 && !(at_end > tolerance); ++k) {
+      const double left = (2.0 * low + high) / 3.0, right = (low + 2.0 * high) / 3.0;
+      const double at_left = violation(left), at_right = violation(right);
+      const bool is_left = at_left > at_right;
+      until = is_left ? left : right;
+      at_end = is_left ? at_left : at_right;
+      (is_left ? high : low) = is_left ? right : left;
     }
-    if (at_left <= tolerance && at_right <= tolerance) return {};
-    until = at_left > tolerance ? left : right;
-    at_end = at_left > tolerance ? at_left : at_right;
+    if (!(at_end > tolerance)) return {};
   }
   const double at_start = calc_loss(actions, now(), limit);
   if (at_start > 0.0) return 0.0;
@@ -561,11 +551,8 @@ void HybridMotion::let_go(const Actions& actions, double time, const Limit& limi
   if (limit.of == Limit::Of::kBody) set_free(limit.index);
   const Members candidates = unite(find_touching(now()), mode_.taut);
   choose(actions, candidates);
-  if (limit.of == Limit::Of::kCable && mode_.taut == before.taut) {  // it is rounding of 0
-    Members others = before.taut;
-    others.remove(limit.index);
-    keep(actions, others);
-  }
+  if (limit.of == Limit::Of::kCable && mode_.taut == before.taut)  // it is rounding of 0
+    keep(actions, without(before.taut, limit.index));
   report(before, time, events);
 }
 
