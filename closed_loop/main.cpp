@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "closed_loop/recorded_flight.hpp"
+#include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
 
@@ -39,6 +40,7 @@ int main(int argc, char** argv) {
     if (folder.empty()) {
       closed_loop::Flight flown(scenario, closed_loop::list_vehicles(scenario), flight);
       while (app::stop_signal() == 0 && flown.fly_step()) end.last_step = flown.steps()[0].step;
+      for (const std::string& remark : flown.take_remarks()) app::log({true, remark});
       end.failure = app::stop_signal() != 0 ? "interrupted" : flown.failure();
     } else {
       flight.measures_compute_time = true;

@@ -80,17 +80,19 @@ class System:
         """N masses and lengths; N × 3 attachments in the load's axes, from its centre of mass; the 3 × 3 inertia of
         the load about it (None: a point load, whose attachments must be 0). `restitution` is the share of the speed
         with which ends that were stopped by their cable come back, 0 to 1."""
-        mass = _to_array("vehicle_mass_kg", np.atleast_1d(vehicle_mass_kg), (None,))
+        mass = _to_array("vehicle_mass_kg", vehicle_mass_kg, (None,), least=1)
         self.count = len(mass)
         """Number of vehicles, N."""
         if not 1 <= self.count <= MOST_VEHICLES:
             raise InputError(f"vehicle_mass_kg: expected 1 to {MOST_VEHICLES} vehicles, got {self.count}")
-        length = _to_array("cable_length_m", np.atleast_1d(cable_length_m), (self.count,))
-        attachment = _to_array("attachment_m", np.atleast_2d(attachment_m), (self.count, 3))
-        for name, values in (("vehicle_mass_kg", mass), ("cable_length_m", length), ("load_mass_kg", load_mass_kg),
-                             ("length_tolerance_m", length_tolerance_m)):
-            if not np.all(_to_array(name, values, np.shape(values)) > 0):
-                raise InputError(f"{name}: expected > 0, got {np.min(values)}")
+        length = _to_array("cable_length_m", cable_length_m, (self.count,), least=1)
+        attachment = _to_array("attachment_m", attachment_m, (self.count, 3), least=2)
+        load_mass = _to_array("load_mass_kg", load_mass_kg, ())
+        tolerance = _to_array("length_tolerance_m", length_tolerance_m, ())
+        for name, values in (("vehicle_mass_kg", mass), ("cable_length_m", length), ("load_mass_kg", load_mass),
+                             ("length_tolerance_m", tolerance)):
+            if not np.all(values > 0):
+                raise InputError(f"{name}: expected > 0, got {np.min(values):g}")
         gravity = float(_to_array("gravity_m_s2", gravity_m_s2, ()))
         if not 0 <= float(_to_array("restitution", restitution, ())) <= 1:
             raise InputError(f"restitution: expected 0 to 1, got {restitution}")
@@ -100,8 +102,8 @@ class System:
         elif np.any(attachment):
             raise InputError("attachment_m: expected 0 for a load without load_inertia_kg_m2, which is a point; got "
                              f"{np.max(np.abs(attachment))}")
-        self._core = load_core().Cables(mass, length, attachment, float(load_mass_kg), inertia, gravity,
-                                        float(restitution), float(length_tolerance_m))
+        self._core = load_core().Cables(mass, length, attachment, float(load_mass), inertia, gravity,
+                                        float(restitution), float(tolerance))
 
     def accelerations(self, load: Any, vehicles: Any, forces: ArrayLike, *, length_rate_m_s: ArrayLike = 0.0,
                       length_acceleration_m_s2: ArrayLike = 0.0) -> Accelerations:
@@ -133,6 +135,7 @@ class System:
         turn = _to_array("load.quaternion", quaternion, (4,))
         if not np.any(turn):
             raise InputError("load.quaternion: expected a length > 0, got 0")
+        turn /= np.max(np.abs(turn))  # else its square could overflow
         numbers = np.concatenate([
             _to_array("load.position", position, (3,)), _to_array("load.velocity", velocity, (3,)),
             turn / np.linalg.norm(turn), _to_array("load.rates", rates, (3,))])
@@ -151,9 +154,10 @@ def _to_tuple(name: str, given: Any, kind: Any) -> Any:
         raise InputError(f"{name}: expected {', '.join(kind._fields)}, got {got}") from None
 
 
-def _to_array(name: str, values: Any, shape: tuple[int | None, ...]) -> np.ndarray:
+def _to_array(name: str, values: Any, shape: tuple[int | None, ...], least: int = 0) -> np.ndarray:
+    """`values` with at least `least` dimensions."""
     try:
-        array = np.array(values, dtype=float)
+        array = np.array(values, dtype=float, ndmin=least)
     except (TypeError, ValueError):
         raise InputError(f"{name}: expected numbers, got {values!r}".replace("\n", " ")) from None
     if len(array.shape) != len(shape) or any(n not in (None, m) for n, m in zip(shape, array.shape, strict=True)):

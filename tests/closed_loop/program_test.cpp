@@ -89,6 +89,26 @@ TEST(ClosedLoopErrorsTest, AnInterruptedFlightClosesItsFiles) {
   EXPECT_TRUE(Table(folder / "recording/state.csv").is_well_formed());
 }
 
+TEST(ClosedLoopErrorsTest, AFlightOfWhichAllCablesGoSlackFliesOnAndSaysSo) {
+  // Each vehicle dives faster than its end of the load falls.
+  std::string dives = "faults:\n";
+  for (const char* id : {"0", "1", "2"})
+    dives += std::string("  - bias: { on: command, vehicle: ") + id +
+             ", force_n: [0, 0, 30], from_s: 0.5, to_s: 0.6 }\n";
+  TemporaryFolder folder;
+  const std::string file =
+      make_scenario(folder,
+                    {{"force_limit_n: 200", "force_limit_n: 200\n  retaut_rate_m_s: 0.5"},
+                     {"mission:", dives + "mission:"}},
+                    "three_carry_a_triangle");
+  Process alone({program("closed_loop"), "--scenario", file});
+  EXPECT_EQ(alone.wait(), 0) << alone.output();
+  for (const char* text :
+       {"warning: vehicle 2: cable slack at 0.500000000 s; no cable carries the load\n",
+        "warning: vehicle 2: cable taut at ", "finished: 6500 steps"})
+    EXPECT_TRUE(holds(alone.output(), text)) << alone.output();
+}
+
 TEST(ClosedLoopErrorsTest, AFullDiskLeavesNoFolder) {
   TemporaryFolder folder;
   Process flight({"/bin/sh", "-c",

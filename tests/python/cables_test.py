@@ -112,6 +112,12 @@ def test_accelerations_do_not_depend_on_the_world_axes_without_gravity():
     ({"attachment_m": [[0, 0, 0]]}, "attachment_m: expected 2 × 3, got 1 × 3"),
     ({"load_mass_kg": float("nan")}, "load_mass_kg: expected finite numbers, got nan"),
     ({"load_mass_kg": "heavy"}, "load_mass_kg: expected numbers, got 'heavy'"),
+    ({"load_mass_kg": [0.3]}, "load_mass_kg: expected a number, got 1"),
+    ({"load_mass_kg": -0.3}, "load_mass_kg: expected > 0, got -0.3"),
+    ({"length_tolerance_m": []}, "length_tolerance_m: expected a number, got 0"),
+    ({"cable_length_m": [1, [2]]}, "cable_length_m: expected numbers, got [1, [2]]"),
+    ({"attachment_m": [[1, 2, 3], [1]]}, "attachment_m: expected numbers, got [[1, 2, 3], [1]]"),
+    ({"attachment_m": [[1, 2, float("nan")], [1, 2, 3]]}, "attachment_m: expected finite numbers, got nan"),
     ({"load_inertia_kg_m2": [1, 1, 1]}, "load_inertia_kg_m2: expected 3 × 3, got 3"),
     ({"load_inertia_kg_m2": np.diag([1, 1, 3])}, "load_inertia_kg_m2: expected principal moments of which none"),
     ({"load_inertia_kg_m2": np.diag([0, 1, 1])}, "load_inertia_kg_m2: expected principal moments > 0, got 0"),
@@ -142,3 +148,13 @@ def test_an_impossible_motion_is_refused_in_one_line(load, vehicles, message):
         with pytest.raises(sls.ConfigError) as raised:
             act()
         assert str(raised.value) == message
+
+
+@pytest.mark.parametrize("length", [1e-320, 1e-5, 1e308])
+def test_a_quaternion_may_have_any_length(length):
+    above = Vehicles([[0, 0.2, -1], [0, -0.2, -1.2]], np.zeros((2, 3)))  # of a bar along y
+    unit, other = (make_bar().accelerations(REST._replace(quaternion=(size, 0, 0, size)), above,
+                                            [[1, 0, -8], [0, 2, -9]]) for size in (1.0, length))
+    assert unit.taut.all()
+    for wanted, got in zip(unit, other, strict=True):
+        assert np.array_equal(wanted, got)

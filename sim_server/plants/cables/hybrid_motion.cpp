@@ -40,6 +40,31 @@ double find_crossing(const Value& value, double low, double at_low, double high,
   return high;
 }
 
+/// A value and its derivative by time.
+struct Slope {
+  double value, rate;
+};
+
+/// When a value rises above 0, within kTimeTolerance or where it is less than `rounding`. It is
+/// that of `start` at 0, from where it can fall first, and `at_high` > 0 at `high`. Newton's method
+/// from the parabola through these, and bisection where that leaves the interval.
+template <class Find>
+double find_rise(const Find& find, const Slope& start, double high, double at_high,
+                 double rounding) {
+  const double bend = (at_high - start.value - high * start.rate) / (high * high);
+  const double root = start.rate * start.rate - 4.0 * bend * start.value;
+  double time = 0.5 * (std::sqrt(std::max(root, 0.0)) - start.rate) / bend;
+  double low = 0.0;
+  for (int i = 0; i < 150 && high - low > kTimeTolerance; ++i) {
+    if (!(time > low && time < high)) time = 0.5 * (low + high);
+    const Slope at = find(time);
+    if (at.rate > 0.0 && std::abs(at.value) <= rounding) return time;
+    (at.value > std::max(start.value, 0.0) ? high : low) = time;
+    time -= at.value / at.rate;
+  }
+  return high;
+}
+
 /// Of two lines, with value and slope at 0 and at 1, the value where they cross.
 double calc_tangents_crossing(double at_0, double slope_0, double at_1, double slope_1) {
   return at_0 + slope_0 * (at_1 - at_0 - slope_1) / (slope_0 - slope_1);
@@ -65,6 +90,15 @@ double get_z(const Motion& motion, std::size_t body) {
 
 double get_fall(const Motion& motion, std::size_t body) {
   return (body == kLoad ? motion.v_WL : motion.vehicles[body].v_W).z();
+}
+
+double get_mass(const System& system, std::size_t body) {
+  return body == kLoad ? system.load_mass : system.vehicle_mass[body];
+}
+
+Members without(Members some, std::size_t one) {
+  some.remove(one);
+  return some;
 }
 
 void stop(const Members& bodies, Motion& motion) {
@@ -159,7 +193,6 @@ Members HybridMotion::find_touching(const Instant& instant) const {
   const double speed = instant.motion.v_WL.lpNorm<1>(), place = instant.motion.p_WL.lpNorm<1>();
   Members touching = find_candidates(uncut_, instant.geometry, kTouching * (1.0 + place),
                                      kTouching * (1.0 + speed));
-  if (mode_.standing.empty()) return touching;
   return find_moving(touching, mode_.standing);
 }
 
@@ -246,8 +279,7 @@ double HybridMotion::calc_lift(const Actions& actions, const Instant& instant,
                                std::size_t body) const {
   const double pulled = -instant.ground[body];
   if (!(pulled > 0.0)) return pulled;
-  Members standing = mode_.standing;
-  standing.remove(body);
+  const Members standing = without(mode_.standing, body);
   const System freed = hold_still(system_, standing);
   Geometry geometry;
   calc_geometry(freed, instant.motion, uncut_, geometry);
@@ -256,9 +288,8 @@ double HybridMotion::calc_lift(const Actions& actions, const Instant& instant,
       standing);
   const Motion rate =
       calc_accelerations(freed, instant.motion, geometry, act(actions, instant), candidates).rate;
-  const double mass = body == kLoad ? system_.load_mass : system_.vehicle_mass[body];
-  const double rise = body == kLoad ? -rate.v_WL.z() : -rate.vehicles[body].v_W.z();
-  return std::min(pulled, mass * rise);
+  // A rate holds accelerations where a motion holds velocities.
+  return std::min(pulled, get_mass(system_, body) * -get_fall(rate, body));
 }
 
 /// The `cables` are taut from now on, also if they push.
@@ -294,9 +325,7 @@ void HybridMotion::choose(const Actions& actions, const Members& candidates) {
 }
 
 void HybridMotion::set_free(std::size_t body) {
-  Members others = mode_.standing;
-  others.remove(body);
-  set_standing(others);
+  set_standing(without(mode_.standing, body));
   calc_geometry(held_, now().motion, uncut_, now().geometry);
 }
 
@@ -319,8 +348,7 @@ Vector HybridMotion::hit(const Members& meeting) {
     const std::size_t body = *next;
     tried.add(body);
     // The impulse with which the ground stops the body.
-    double down =
-        (body == kLoad ? system_.load_mass : system_.vehicle_mass[body]) * get_fall(before, body);
+    double down = get_mass(system_, body) * get_fall(before, body);
     double scale = std::abs(down);
     for (const std::size_t i : meeting) {
       if (body != kLoad && body != i) continue;
@@ -330,9 +358,7 @@ Vector HybridMotion::hit(const Members& meeting) {
     }
     if (!(down < -kRounding * scale)) continue;
     const Members standing = mode_.standing;
-    Members others = standing;
-    others.remove(body);
-    fly_on(others);
+    fly_on(without(standing, body));
     if (get_fall(now().motion, body) < 0.0)
       tried = {};  // it rises; the other bodies feel other impulses
     else
@@ -394,28 +420,17 @@ std::optional<double> HybridMotion::find_loss(const Actions& actions, double h,
                  rise = start - 4.0 * between + 3.0 * last;
     if (!(fall < 0.0 && rise > 0.0)) return {};
     if (!(calc_tangents_crossing(start, fall, last, rise) < -tolerance)) return {};
-    // Golden section, until a negative tension is found.
-    constexpr double kGolden = 0.6180339887498949;
-    double low = 0.0, high = h, left = h - kGolden * h, right = kGolden * h;
-    double at_left = violation(left), at_right = violation(right);
-    for (int k = 0; k < 40 && at_left <= tolerance && at_right <= tolerance; ++k) {
-      if (at_left > at_right) {
-        high = right;
-        right = left;
-        at_right = at_left;
-        left = high - kGolden * (high - low);
-        at_left = violation(left);
-      } else {
-        low = left;
-        left = right;
-        at_left = at_right;
-        right = low + kGolden * (high - low);
-        at_right = violation(right);
-      }
+    // Thirds, until a negative tension is found.
+    double low = 0.0, high = h;
+    for (int k = 0; k < 40 && !(at_end > tolerance); ++k) {
+      const double left = (2.0 * low + high) / 3.0, right = (low + 2.0 * high) / 3.0;
+      const double at_left = violation(left), at_right = violation(right);
+      const bool is_left = at_left > at_right;
+      until = is_left ? left : right;
+      at_end = is_left ? at_left : at_right;
+      (is_left ? high : low) = is_left ? right : left;
     }
-    if (at_left <= tolerance && at_right <= tolerance) return {};
-    until = at_left > tolerance ? left : right;
-    at_end = at_left > tolerance ? at_left : at_right;
+    if (!(at_end > tolerance)) return {};
   }
   const double at_start = calc_loss(actions, now(), limit);
   if (at_start > 0.0) return 0.0;
@@ -445,27 +460,38 @@ std::optional<double> HybridMotion::find_arrival(const Actions& actions, double 
     at_end = violation(until);
     if (!(at_end > tolerance)) return {};
   }
-  double from = 0.0, at_start = start;
   const bool leaves = limit.of == Limit::Of::kCable ? rate < 0.0 : rate <= 0.0;
-  if (start >= -tolerance && leaves) {
-    // It just left its limit, and comes back: begin where it is away.
-    for (from = 0.5 * until; from > kTimeTolerance; from *= 0.5)
-      if ((at_start = violation(from)) < 0.0) break;
+  const bool returns = start >= -tolerance && leaves;  // it just left its limit, and comes back
+  if (start >= 0.0 && !returns) return 0.0;
+  // By a parabola it gets away by (rate until / 2)² / at_end at most.
+  const double way = 0.5 * rate * until;
+  if (returns && rate < 0.0 && way * way <= tolerance * at_end) return 0.0;
+  if (returns || is_later_) {
+    const auto find = [&](double time) {
+      const double value = violation(time);
+      return Slope{value, calc_excess_rate(trial_, limit)};
+    };
+    return find_rise(find, {start, rate}, until, at_end, 1e-2 * tolerance);
   }
-  if (at_start >= 0.0) return 0.0;
-  return find_crossing(violation, from, at_start, until, at_end);
+  // Not so the first event of a step: the last bits of recordings depend on its search.
+  return find_crossing(violation, 0.0, start, until, at_end);
 }
 
-HybridMotion::Found HybridMotion::find_first(const Actions& actions, double h, const Instant& end) {
-  Found first;
-  const Holding middle = between_;  // a search overwrites it
+/// Flies to the first event within `h`, or to its end.
+HybridMotion::Found HybridMotion::find_first(const Actions& actions, double h) {
+  integrate(actions, h, then());
+  Holding middle = between_;  // a search overwrites it
+  Found first{h, {}};
   const auto look = [&](const Limit& limit) {
     const bool is_held = holds(limit);
     if (is_held && is_stuck_) return;
-    const auto time =
-        is_held ? find_loss(actions, h, middle, end, limit) : find_arrival(actions, h, end, limit);
-    if (time && (first.limit.of == Limit::Of::kNothing || *time < first.time))
-      first = {*time, limit};
+    const auto time = is_held ? find_loss(actions, first.time, middle, then(), limit)
+                              : find_arrival(actions, first.time, then(), limit);
+    if (!time || (first.limit.of != Limit::Of::kNothing && !(*time < first.time))) return;
+    first = {*time, limit};
+    // Later events do not count.
+    integrate(actions, first.time, then());
+    middle = between_;
   };
   for (const std::size_t i : uncut_)
     if (moves(i, mode_.standing)) look({Limit::Of::kCable, i});
@@ -525,11 +551,8 @@ void HybridMotion::let_go(const Actions& actions, double time, const Limit& limi
   if (limit.of == Limit::Of::kBody) set_free(limit.index);
   const Members candidates = unite(find_touching(now()), mode_.taut);
   choose(actions, candidates);
-  if (limit.of == Limit::Of::kCable && mode_.taut == before.taut) {  // it is rounding of 0
-    Members others = before.taut;
-    others.remove(limit.index);
-    keep(actions, others);
-  }
+  if (limit.of == Limit::Of::kCable && mode_.taut == before.taut)  // it is rounding of 0
+    keep(actions, without(before.taut, limit.index));
   report(before, time, events);
 }
 
@@ -580,12 +603,10 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
   }
   double time = 0.0;
   for (int count = 1;; ++count) {
-    const double rest = h - time;
-    integrate(actions, rest, then());
-    const Found found = find_first(actions, rest, then());
-    if (found.limit.of == Limit::Of::kNothing) break;
-    integrate(actions, found.time, then());
+    is_later_ = count > 1;
+    const Found found = find_first(actions, h - time);
     now_at_ = 1 - now_at_;
+    if (found.limit.of == Limit::Of::kNothing) break;
     time += found.time;
     if (holds(found.limit))
       let_go(actions, time, found.limit, events);
@@ -597,7 +618,6 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
     }
     if (time >= h) return;
   }
-  now_at_ = 1 - now_at_;
   check_held();
 }
 

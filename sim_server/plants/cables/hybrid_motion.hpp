@@ -114,7 +114,7 @@ class HybridMotion {
                                   const Instant& end, const Limit& limit);
   std::optional<double> find_arrival(const Actions& actions, double h, const Instant& end,
                                      const Limit& limit);
-  Found find_first(const Actions& actions, double h, const Instant& end);
+  Found find_first(const Actions& actions, double h);
   void meet(const Actions& actions, double time, const Limit& limit, std::vector<Event>& events);
   void let_go(const Actions& actions, double time, const Limit& limit, std::vector<Event>& events);
   void check_held() const;
@@ -132,6 +132,7 @@ class HybridMotion {
   mutable Actions acting_;    // of the rotors at one instant; a member because it is large
   Holding between_;           // in the middle of the step last integrated
   double force_scale_ = 0.0;  // of all forces, N
+  bool is_later_ = false;     // not the first event of a step
   bool is_stuck_ = false;
 };
 

@@ -50,12 +50,11 @@ System hold_still(const System& system, const Members& standing) {
 void add(const System& system, const Motion& start, double h, const Motion& rate, Motion& sum) {
   sum.p_WL = start.p_WL + h * rate.p_WL;
   sum.v_WL = start.v_WL + h * rate.v_WL;
+  sum.q_WL = start.q_WL;
+  sum.w_WL_L = start.w_WL_L;
   if (system.is_rigid) {
-    sum.q_WL = start.q_WL + h * rate.q_WL;
-    sum.w_WL_L = start.w_WL_L + h * rate.w_WL_L;
-  } else {
-    sum.q_WL = start.q_WL;
-    sum.w_WL_L = start.w_WL_L;
+    sum.q_WL += h * rate.q_WL;
+    sum.w_WL_L += h * rate.w_WL_L;
   }
   for (std::size_t i = 0; i < system.count; ++i) {
     const Vehicle &from = start.vehicles[i], &change = rate.vehicles[i];
