@@ -72,7 +72,6 @@ void ParticipantWatch::look(Surroundings& around, sync::Time now) {
   report_.problem = around.replace_problems(check_.look(neighbourhood));
   problems_version_ = around.problems_version();
   for (const std::string& event : check_.answers().take_events()) report_.announce(event, now);
-  for (const std::string& remark : fleet_.take_remarks()) report_.announce(remark, now);
 }
 
 void ParticipantWatch::report_silent_recorder(sync::Time now) {

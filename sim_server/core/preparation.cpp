@@ -30,6 +30,7 @@ void Preparation::check_claim(const Surroundings& around) const {
 void Preparation::start_gathering(sync::Time now) {
   gathering_.emplace(run_.scenario.sync.wait_for, run_.scenario.sha256, run_.fleet.ids(), now);
   run_.report.publish(RunPhase::PHASE_WAITING, "participants are not ready", now);
+  run_.announce_remarks(now);
 }
 
 bool Preparation::gather(const Surroundings& around, sync::Time now) {

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <utility>
 
 #include "sim_server/core/absence_report.hpp"
@@ -23,6 +24,11 @@ struct RunParts {
         watch(scenario, run_id, fleet, report),
         control(run_id, fleet.ids(), begins_paused),
         absence(fleet, watch, report, scenario.sync.mode == config::SyncMode::kLockstep) {}
+
+  /// What the plants have said since the last call becomes events of this step.
+  void announce_remarks(sync::Time now) {
+    for (const std::string& remark : fleet.take_remarks()) report.announce(remark, now);
+  }
 
   /// The run was at rest for `rest`, which counts neither as absence nor as delay.
   void note_rest(sync::Duration rest) {

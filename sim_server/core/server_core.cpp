@@ -196,6 +196,7 @@ void ServerCore::finish_step(sync::Time now) {
     parts_.report.series.timing.add(vehicle->record().kind, vehicle->calc_age());
   phase_ = Phase::kAwaitingDue;  // its states are recorded: no second time, should a plant fail
   parts_.fleet.advance();
+  parts_.announce_remarks(now);
   parts_.fleet.expect_answers();
   if (const auto reply = parts_.control.stepped(parts_.fleet.step())) parts_.outputs.send(*reply);
   publish_if_allowed(now);
@@ -223,7 +224,7 @@ void ServerCore::end_run(End end, RunPhase phase, const std::string& reason, syn
     parts_.outputs.record_step(parts_.fleet);
   }
   parts_.outputs.end_records();
-  for (const std::string& remark : parts_.fleet.take_remarks()) parts_.report.announce(remark, now);
+  parts_.announce_remarks(now);  // of a step that failed
   parts_.report.publish(phase, reason, now);
   if (end == End::kFinished) parts_.outputs.log({false, parts_.report.describe_end(now)});
 }

@@ -536,7 +536,7 @@ TEST(ServerLockstepTest, ALoadFarFromItsReferenceIsAnEvent) {
                                   "expected at most 50 rod lengths (50 m)"});
 }
 
-TEST(ServerLockstepTest, ARemarkOfAPlantIsAnEventAtTheNextLookOrAtTheEnd) {
+TEST(ServerLockstepTest, ARemarkOfAPlantAtItsStartIsAnEventAtOnceOrAtTheEnd) {
   auto scenario = ServerRig::make_scenario();
   const auto multirotor =
       config::load_scenario(SLS_SOURCE_DIR "/config/scenarios/multirotor_figure_eight.yaml");
@@ -550,6 +550,25 @@ TEST(ServerLockstepTest, ARemarkOfAPlantIsAnEventAtTheNextLookOrAtTheEnd) {
               "0: vehicle 0: the rotors have no authority over yaw: they cannot turn the vehicle "
               "about z alone");
   }
+}
+
+TEST(ServerLockstepTest, ARemarkOfAPlantIsAnEventOfItsStep) {
+  auto scenario = config::load_scenario(SLS_SOURCE_DIR "/config/scenarios/two_carry_a_bar.yaml");
+  scenario.sync.wait_for.recorders = 0;
+  ServerRig rig(scenario);
+  rig.join("pilot");
+  ServerRig::Answer answer;
+  answer.vehicle_ids = {0, 1};
+  rig.answer("pilot", answer);
+  EXPECT_EQ(rig.status().step(), 0u);
+  rig.take_log();
+  answer.step = 1;
+  answer.more_force = -50.0;  // downwards: both vehicles dive at once
+  rig.answer("pilot", answer);
+  EXPECT_EQ(rig.status().step(), 2u);
+  const std::string slack = "cable slack at 0.004000000 s; no cable carries the load";
+  EXPECT_EQ(rig.status().reason().to_string(), "vehicle 1: " + slack);
+  EXPECT_EQ(rig.take_log(), (Lines{"0: vehicle 0: " + slack, "0: vehicle 1: " + slack}));
 }
 
 TEST(ServerLockstepTest, AMistakeOfAParticipantIsInTheStatusWithinTheTimeOfALook) {
