@@ -16,7 +16,7 @@ except ImportError:
     print(f"skipped: no _sls_core in {support.BUILD / 'python'}")
     sys.exit(77)
 
-from sls.campaign import findings
+from sls.campaign import findings, predictions
 from sls.campaign.campaign_file import load_campaign
 from sls.campaign.check import check_campaign
 from sls.campaign.sampling import make_values, to_yaml_value
@@ -38,7 +38,7 @@ def list_values(campaign, run):
 
 class ShippedCampaignsTest(unittest.TestCase):
     def test_they_are_those_that_the_page_studies(self):
-        self.assertEqual({file.stem for file in FILES}, set(findings.NAMES))
+        self.assertEqual({file.stem for file in FILES}, set(findings.STUDIES))
 
     def test_every_base_is_used_and_bears_its_files_name(self):
         used = {load_campaign(file).base.resolve() for file in FILES}
@@ -74,7 +74,7 @@ class ShippedCampaignsTest(unittest.TestCase):
 
     def test_the_page_holds_pictures_of_all(self):
         page = (support.ROOT / "docs/campaigns.md").read_text()
-        for name in findings.NAMES:
+        for name in findings.STUDIES:
             self.assertIn(f"](campaigns/{name}.png)", page)
             self.assertGreater((support.ROOT / f"docs/campaigns/{name}.png").stat().st_size, 5000)
             self.assertIn(f"./sls campaign {name} ", page)
@@ -97,23 +97,23 @@ class PredictionTest(unittest.TestCase):
         return not found["stage_2_load_error_rms_x_m"] < 0.98 * found["stage_1_load_error_rms_x_m"]
 
     def test_small_motions_of_a_load_of_the_wrong_mass_grow_where_it_is_predicted(self):
-        gains, vertical = findings.calc_lqr_gains(10, 4), findings.calc_lqr_gains(5, 2)
+        gains, vertical = predictions.calc_lqr_gains(10, 4), predictions.calc_lqr_gains(5, 2)
         for mass in (0.1, 0.2, 0.4):
-            limit = findings.calc_delay_limit(gains, mass, 0.0, vertical)
+            limit = predictions.calc_delay_limit(gains, mass, 0.0, vertical)
             periods = round(limit / 0.004)
             self.assertFalse(self.do_motions_grow(mass, round(0.004 * (periods - 2), 3)), mass)
             self.assertTrue(self.do_motions_grow(mass, round(0.004 * (periods + 3), 3)), mass)
 
     def test_the_right_mass_is_the_formula_of_the_readme(self):
-        gains = findings.calc_lqr_gains(10, 4)
+        gains = predictions.calc_lqr_gains(10, 4)
         # closed_loop/README.md: 0.234 s, minus half a period for the hold.
-        self.assertAlmostEqual(findings.calc_delay_limit(gains), 0.232, delta=5e-4)
+        self.assertAlmostEqual(predictions.calc_delay_limit(gains), 0.232, delta=5e-4)
         np.testing.assert_allclose(gains, [3.1623, 8.4827, 9.7962, 5.4399], atol=5e-5)
 
     def test_the_load_sags_as_predicted(self):
         # After 12 s the transient is below a millimetre.
         _, found = self.fly("mass_and_delay", vehicle__load_mass_kg=0.3)
-        sag = 9.8 * (0.3 - 0.2) / ((1.5 + 0.2) * findings.calc_lqr_gains(5, 2)[0])
+        sag = 9.8 * (0.3 - 0.2) / ((1.5 + 0.2) * predictions.calc_lqr_gains(5, 2)[0])
         self.assertAlmostEqual(found["stage_2_load_error_rms_z_m"], sag, delta=1e-3)
 
     def test_a_gust_moves_the_load_as_predicted(self):
@@ -121,23 +121,23 @@ class PredictionTest(unittest.TestCase):
         outcome, found = self.fly("wind", faults__0__bias__force_n=f"[{force}, 0, 0]",
                                   plant__rotor_drag_n_s_m=0)
         self.assertEqual(outcome, "finished")
-        peak = force * findings.calc_pulse_peak(findings.calc_lqr_gains(10, 4))
+        peak = force * predictions.calc_pulse_peak(predictions.calc_lqr_gains(10, 4))
         # The tolerance includes the transient of the start, a few millimetres.
         self.assertAlmostEqual(found["load_error_max_x_m"], peak, delta=0.01 * peak + 0.005)
 
     def test_a_team_of_other_masses_than_believed_hangs_as_predicted(self):
-        team = findings.read_base_team("team")
+        team = predictions.read_base_team("team")
         for load_share, mass in ((0.093, 0.255), (0.0935, 0.25), (0.0935, 0.245)):
             outcome, found = self.fly("team", vehicle__load_mass_kg=load_share, vehicles__0__quad_mass_kg=mass)
             self.assertEqual(outcome, "finished")
-            predicted = findings.calc_rest_error(findings.change_first(team, mass_kg=mass), 3 * load_share)
+            predicted = predictions.calc_rest_error(predictions.change_first(team, mass_kg=mass), 3 * load_share)
             # Second order: 2 % of the mass tilts the load by 0.04 rad.
             self.assertAlmostEqual(found["load_error_end_m"], predicted, delta=0.06 * predicted)
 
     def test_the_vertical_loop_ends_where_its_root_is_imaginary(self):
         for weight in (5.0, 50.0, 500.0):
-            position, velocity = findings.calc_lqr_gains(weight, 2)
-            delay = findings.calc_vertical_limit((position, velocity)) + findings.PERIOD_S / 2
+            position, velocity = predictions.calc_lqr_gains(weight, 2)
+            delay = predictions.calc_vertical_limit((position, velocity)) + predictions.PERIOD_S / 2
             w = np.sqrt((velocity**2 + np.sqrt(velocity**4 + 4 * position**2)) / 2)
             s = 1j * w
             self.assertAlmostEqual(abs(s**2 + np.exp(-s * delay) * (velocity * s + position)), 0.0,

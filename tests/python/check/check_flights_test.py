@@ -15,6 +15,7 @@ from xml.etree import ElementTree
 import pytest
 
 import sls.check.flights
+import sls.report
 from sls.check.cli import main
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -166,7 +167,9 @@ CLIENT = (f"command: [{sys.executable}, -BPm, sls.check.python_law, client, 'law
     ("python: law.py:nonsense", "failed: controller 'controller' answered step 300 with a force beyond"),
     ("python: law.py:broken", "controller: ended with 1 at step 0, before the flight was over: controller: "),
 ])
-def test_the_verdict_names_what_a_controller_did(check, impatient, tmp_path, controller, expected):
+def test_the_verdict_names_what_a_controller_did(check, impatient, monkeypatch, tmp_path, controller, expected):
+    # Drawing takes seconds.
+    monkeypatch.setattr(sls.report, "save", lambda figure, path, *_, **__: path.write_text("<svg></svg>"))
     if "not ready within 4 s" in expected:
         (tmp_path / "mine.yaml").write_text(SCENARIO.replace("timeout_s: 60", "timeout_s: 4"))
     has_page = "licence" in controller or "crash" in controller  # without steps, and with figures
