@@ -180,7 +180,9 @@ void Network::forget(Peer& observer, const Peer& observed) {
 
 bool Network::is_lost(const Peer& from, const Peer& to) {
   const Link& way = link(from.process().host(), to.process().host());
-  return way.is_cut || way.busy_until - timeline_.now() > kQueue || random_.chance(way.loss);
+  const bool is_full = way.busy_until - timeline_.now() > kQueue;
+  if (is_full) last_full_ = timeline_.now();
+  return way.is_cut || is_full || random_.chance(way.loss);
 }
 
 Instant Network::draw_delay(const Peer& from, const Peer& to) {

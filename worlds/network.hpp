@@ -184,6 +184,8 @@ class Network {
   bool has_missed_leave(const bus::PeerId& observer, const bus::PeerId& observed) const {
     return missed_leaves_.count({observer, observed}) > 0;
   }
+  /// When the queue before a link was full for the last time; nothing if none was.
+  std::optional<Instant> last_full() const { return last_full_; }
 
  private:
   friend class Peer;
@@ -219,6 +221,7 @@ class Network {
   std::map<std::pair<const Host*, const Host*>, Link> links_;
   std::set<std::pair<bus::PeerId, bus::PeerId>> missed_leaves_;      // observer, observed
   std::vector<std::vector<std::array<Channel, kTopics>>> channels_;  // of writer to reader
+  std::optional<Instant> last_full_;
   std::uint64_t next_id_ = 1;
   std::size_t record_history_ = 5000;
 };

@@ -30,6 +30,8 @@ constexpr Instant kQuietTime = 900ms;
 constexpr Instant kBeginsWithin = 60ms;
 /// The others have heard of it, unless something is in the way.
 constexpr Instant kHeardWithin = 2s;
+/// For so long a server in real time asks for the last answers (sim::RealtimePacing).
+constexpr Instant kLastAttempts = 1s;
 
 /// A server waits longer than this for recorders that do not get on.
 constexpr Instant kWaitsFor = 5s;
@@ -91,6 +93,7 @@ void Properties::on_run(const Program& server, std::uint64_t run_id, const Param
   Run& run = runs_[run_id];
   run.flight = std::make_unique<FlightWatch>(scenario, run_id, server,
                                              [this](std::string text) { find(std::move(text)); });
+  run.is_realtime = scenario.sync.mode == config::SyncMode::kRealtime;
   run.waits_for_recorders = scenario.sync.mode == config::SyncMode::kLockstep &&
                             scenario.sync.wait.recorder.policy == config::RecorderPolicy::kWait;
   run.has_faulty_forces =
@@ -256,8 +259,12 @@ void Properties::check_rivals(const Run& run, const Network& network) {
   }
 }
 
-void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate) {
+void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate,
+                            const Network& network) {
   Run& run = runs_[run_id];
+  const auto full = network.last_full();
+  if (run.is_realtime && !is_finished && full && timeline_.now() - *full < kLastAttempts)
+    is_overloaded_ = true;
   run.has_ended = true;
   run.ended = timeline_.now();
   run.is_finished = is_finished;
@@ -407,6 +414,8 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
     if (plan.promise == Promise::kCalm && run.is_finished && !run.is_exact)
       find(fmt::format("calm: run {:016x} has late steps", run_id));
   }
+  // In real time nobody waits for a link that carries less than is sent.
+  const Promise promise = is_overloaded_ ? Promise::kNone : plan.promise;
   std::map<std::filesystem::path, const Program*> folders;
   for (const auto& program : programs) {
     if (!program->process().has_ended()) find(fmt::format("ends: {} still runs", program->name()));
@@ -416,12 +425,12 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
       const auto& recorder = static_cast<const RecorderProgram&>(*program);
       if (!recorder.folder().empty()) folders[recorder.folder()] = program.get();
       for (const StoredRecording& recording : recorder.recordings())
-        check_recording(*program, recording, flown, plan.promise);
+        check_recording(*program, recording, flown, promise);
     }
-    if (plan.promise != Promise::kNone && program->role() == Role::kServer)
+    if (promise != Promise::kNone && program->role() == Role::kServer)
       check_end(*program, programs);
-    const bool may_yield = plan.promise == Promise::kTwoServers && program->role() == Role::kServer;
-    if (plan.promise != Promise::kNone && has_joined(*program) && !may_yield &&
+    const bool may_yield = promise == Promise::kTwoServers && program->role() == Role::kServer;
+    if (promise != Promise::kNone && has_joined(*program) && !may_yield &&
         too_late_.count(program->name()) == 0 && program->exit_code().value_or(0) != 0)
       find(fmt::format("finishes: {} ends with {}: {}", program->name(), *program->exit_code(),
                        program->reason()));
@@ -432,10 +441,9 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
   for (const auto& [folder, program] : folders)
     for (StoredRecording& recording : read_recordings(folder)) {
       if (is_power_cut && !recording.is_closed) recording.damages.clear();
-      check_recording(*program, recording, flown, plan.promise);
+      check_recording(*program, recording, flown, promise);
     }
-  if (plan.promise != Promise::kNone && !is_any_finished())
-    find("finishes: no flight was finished");
+  if (promise != Promise::kNone && !is_any_finished()) find("finishes: no flight was finished");
 }
 
 /// A flight begins as soon as the expected ones are ready.

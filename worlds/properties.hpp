@@ -71,7 +71,8 @@ class Properties {
     runs_[run_id].flight->on_late();
   }
   void on_status(const SimStatus& status, const Network& network);
-  void on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate);
+  void on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate,
+                  const Network& network);
   /// `heard`: what the program knows of servers.
   void on_announced(const Program& program, const Participant& message, const sync::Servers& heard);
   void on_request(const SimControl& request) { requests_[request.request_id()] = request.run_id(); }
@@ -123,6 +124,7 @@ class Properties {
     RunPhase phase = RunPhase::PHASE_WAITING;
     int furthest = 0;         // progress of its furthest phase (sync::calc_progress)
     bool has_status = false;  // its claim is settled
+    bool is_realtime = false;
     bool waits_for_recorders = false;
     bool has_faulty_forces = false;  // the scenario disturbs them
     bool is_match_late = false;
@@ -160,6 +162,7 @@ class Properties {
   std::map<std::string, std::uint64_t> joined_;                  // last runs
   std::set<std::string> too_late_;                               // that joined a run after its end
   std::map<std::pair<const Program*, const Program*>, Instant> rivals_;  // fly together since
+  bool is_overloaded_ = false;  // a flight in real time failed beside a full link
   std::map<std::uint64_t, std::uint64_t> requests_;  // runs, by number of the request
   std::uint64_t steps_ = 0;
   std::vector<std::string> findings_;

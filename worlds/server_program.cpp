@@ -110,7 +110,7 @@ void ServerProgram::deliver_events() {
 void ServerProgram::end_run() {
   write_waiting();
   setting_.properties.on_run_end(core_->run_id(), core_->end() == sim::ServerCore::End::kFinished,
-                                 certificate_->finish());
+                                 certificate_->finish(), setting_.network);
   if (core_->end() == sim::ServerCore::End::kReset)
     return begin_run({0, false, core_->is_paused()});
   if (core_->error().find("expected no other server") != std::string::npos)

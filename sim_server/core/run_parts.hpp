@@ -25,7 +25,7 @@ struct RunParts {
         control(run_id, fleet.ids(), begins_paused),
         absence(fleet, watch, report, scenario.sync.mode == config::SyncMode::kLockstep) {}
 
-  /// What the plants have said since the last call becomes events of this step.
+  /// Remarks of the plants since the last call become events of this step.
   void announce_remarks(sync::Time now) {
     for (const std::string& remark : fleet.take_remarks()) report.announce(remark, now);
   }
