@@ -63,8 +63,10 @@ def test_the_command_flies_over_dds_and_lists_what_there_is(python, tmp_path):
 
 
 def test_pytest_has_the_plug_in(python, tmp_path):
+    # -B: else pytest leaves files of its own beside the plug-in, which pip does not remove.
     for options in ((), ("-p", "sls.pytest_plugin")):
-        assert "@pytest.mark.sls(check" in start(python, "-m", "pytest", "--markers", *options, cwd=tmp_path).stdout
+        done = start(python, "-B", "-m", "pytest", "--markers", *options, cwd=tmp_path)
+        assert "@pytest.mark.sls(check" in done.stdout
 
 
 def test_a_campaign_by_name_flies_and_every_file_is_removed(python, tmp_path):
