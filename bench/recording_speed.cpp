@@ -66,7 +66,7 @@ class PlainFile {
   /// Visits the fields of a row.
   template <class Field>
   void operator()(const record::Column&, const Field& field) {
-    record::for_each_component(field, [this](const auto& component) { add(component); });
+    record::for_each_component(field, [this](const auto& component) { this->add(component); });
   }
   template <class Number>
   void add(const Number& number) {

@@ -18,7 +18,7 @@ struct FieldParser {
 
   template <class Field>
   void operator()(const Column&, Field& field) {
-    for_each_component(field, [this](auto& component) { parse(component); });
+    for_each_component(field, [this](auto& component) { this->parse(component); });
   }
   void operator()(const Column&, model::Numbers& signals) {
     const std::size_t count = file.columns().size() - index;

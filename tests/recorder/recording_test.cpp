@@ -213,7 +213,7 @@ TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
   EXPECT_EQ(manifest.at("run_id"), "0123456789abcdef");
   EXPECT_EQ(manifest.at("scenario"), "synthetic");
   EXPECT_EQ(manifest.at("scenario_sha256"), config::calc_sha256(kScenarioText));
-  EXPECT_EQ(manifest.at("vehicle_ids"), Json({0}));
+  EXPECT_EQ(manifest.at("vehicle_ids"), Json::array({0}));
   EXPECT_EQ(manifest.at("period_s"), 0.004);
   EXPECT_EQ(manifest.at("step_s"), 0.001);
   EXPECT_EQ(manifest.at("mode"), "lockstep");

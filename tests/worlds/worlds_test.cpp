@@ -14,7 +14,7 @@
 namespace sls::worlds {
 namespace {
 
-#ifdef __SANITIZE_ADDRESS__
+#ifdef SLS_ASAN
 constexpr std::uint64_t kWorlds = 500;
 #else
 constexpr std::uint64_t kWorlds = 10'000;

@@ -229,7 +229,8 @@ def test(words: list[str]) -> NoReturn:
         which += ["--label-regex", "threaded"]
     elif not options.slow:
         which += ["--label-exclude", "slow"]
-    call_script("@setup", "test_packages", "python_packages", "bench_packages", "doc_packages", "package_packages")
+    call_script("@setup", "test_packages", "python_packages", "bench_packages", "doc_packages", "package_packages",
+                *(["fuzz_packages"] if preset == "asan" else []))
     call_script("@npm", ROOT / "tests/tools/view")
     call_script("@tree", preset, folder, *{"asan": ["test_programs"], "tsan": ["threaded_tests"]}.get(preset, []))
     # The tests must not get variables that the middleware reads from the environment.

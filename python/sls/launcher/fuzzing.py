@@ -24,9 +24,9 @@ def fuzz(words: list[str]) -> int:
                         help=f"run only this target: {list_choices(FUZZERS)}")
     options, _ = parser.parse(words)
     targets = [options.target] if options.target else FUZZERS
-    call_script("@setup", "fuzz_packages")
-    folder = ROOT / "build-fuzz"
-    call_script("@tree", "fuzz", folder, *(f"{target}_fuzzer" for target in targets))
+    call_script("@setup", "fuzz_packages", "test_packages")
+    folder = ROOT / "build-asan"
+    call_script("@tree", "asan", folder, *(f"{target}_fuzzer" for target in targets))
     for target in targets:
         run_fuzzer(folder, target, -(-int(options.seconds) // len(targets)))
     return 0

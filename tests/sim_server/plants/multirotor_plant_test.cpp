@@ -175,7 +175,7 @@ struct Differences {
   double tilt = 0.0;                                 // largest of the flight, in rad
 };
 
-#ifdef __SANITIZE_ADDRESS__  // a step takes twenty times as long, and 4 s lean far enough
+#ifdef SLS_ASAN  // a step takes twenty times as long, and 4 s lean far enough
 constexpr double kFlightTime = 4.0;
 #else
 constexpr double kFlightTime = 16.0;  // s

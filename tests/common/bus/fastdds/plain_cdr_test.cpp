@@ -106,7 +106,7 @@ std::vector<RecordBatch> make_messages() {
 template <class Type>
 class PlainCdrTest : public testing::Test {};
 using Types = testing::Types<StatesPubSubType, CommandsPubSubType, RecordBatchPubSubType>;
-TYPED_TEST_SUITE(PlainCdrTest, Types);
+TYPED_TEST_SUITE(PlainCdrTest, Types, );
 
 TYPED_TEST(PlainCdrTest, WritesTheBytesOfTheGeneratedCode) {
   using Message = typename TypeParam::type;
