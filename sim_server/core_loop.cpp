@@ -48,15 +48,15 @@ bool CoreLoop::wait_until_due() {
     // Each step that the middleware's thread takes meanwhile moves the deadline.
     const sync::Time deadline = deadline_.load();
     sleeps_until_ = deadline;
-    if (backlog_.is_waiting() || events_.wait(deadline + calc_slack())) return false;
+    const bool has_slack = is_lockstep_ && awaits_answers_;
+    const auto slack = has_slack ? calc_slack(Clock::now() - unanswered_) : Clock::duration::zero();
+    if (backlog_.is_waiting() || events_.wait(deadline + slack)) return false;
   } while (Clock::now() < deadline_.load());
   return true;
 }
 
-CoreLoop::Clock::duration CoreLoop::calc_slack() const {
-  constexpr Clock::duration kMost = std::chrono::milliseconds(10);
-  return is_lockstep_ && awaits_answers_ ? std::min(kMost, (Clock::now() - unanswered_) / 32)
-                                         : Clock::duration::zero();
+CoreLoop::Clock::duration CoreLoop::calc_slack(Clock::duration duration) {
+  return std::min<Clock::duration>(std::chrono::milliseconds(10), duration / 32);
 }
 
 void CoreLoop::deliver_events(ServerCore& core) {

@@ -20,11 +20,14 @@ namespace sls::sim {
 ///
 /// In lockstep each step moves the deadline by which its answer must have come. To wake at each of
 /// them cost the main thread 2.5 % of a processor, a thousand times a second. So it sleeps longer
-/// by up to a 32nd of the time since an answer was last missing: a lost sample is sent again later,
-/// but a flight becomes at most that much longer.
+/// (`calc_slack`): a lost sample is sent again later, but a flight takes at most a 32nd longer.
 class CoreLoop {
  public:
   using Clock = std::chrono::steady_clock;
+
+  /// How much longer than to a deadline the main thread sleeps where no answer has been missing for
+  /// `duration`: a 32nd of it, at most 10 ms.
+  static Clock::duration calc_slack(Clock::duration duration);
 
   CoreLoop(bool is_lockstep, Surroundings& around, Backlog& backlog)
       : is_lockstep_(is_lockstep), around_(around), backlog_(backlog) {}
@@ -60,7 +63,6 @@ class CoreLoop {
   }
   void note_deadline();
   bool wait_until_due();
-  Clock::duration calc_slack() const;
   void deliver_events(ServerCore& core);
 
   const bool is_lockstep_;
