@@ -1,5 +1,6 @@
 #include "sim_server/core_loop.hpp"
 
+#include <algorithm>
 #include <exception>
 #include <variant>
 
@@ -9,14 +10,17 @@ void CoreLoop::run(ServerCore& core) {
   events_.clear_commands();  // of an earlier run
   std::unique_lock lock(core_mutex_);
   core_ = &core;
+  unanswered_ = Clock::now();
   while (core.phase() != ServerCore::Phase::kEnded) {
     deadline_ = core.next_deadline();
+    awaits_answers_ = core.phase() == ServerCore::Phase::kAwaitingAnswers;
     lock.unlock();
     write_waiting(core);
-    wait_until_due();
+    const bool is_late = wait_until_due();
     main_wants_core_ = true;
     lock.lock();
     main_wants_core_ = false;
+    if (const auto now = Clock::now(); is_late && !core.is_look_due(now)) unanswered_ = now;
     if (core.has_news(around_)) core.on_look(around_, Clock::now());
     deliver_events(core);
     core.on_time(Clock::now());
@@ -38,12 +42,21 @@ void CoreLoop::write_waiting(ServerCore& core) {
   }
 }
 
-void CoreLoop::wait_until_due() {
+/// Returns true if the deadline has passed, false if there is something else to do.
+bool CoreLoop::wait_until_due() {
   do {
     // Each step that the middleware's thread takes meanwhile moves the deadline.
-    sleeps_until_ = deadline_.load();
-    if (backlog_.is_waiting() || events_.wait(sleeps_until_)) return;
+    const sync::Time deadline = deadline_.load();
+    sleeps_until_ = deadline;
+    const bool has_slack = is_lockstep_ && awaits_answers_;
+    const auto slack = has_slack ? calc_slack(Clock::now() - unanswered_) : Clock::duration::zero();
+    if (backlog_.is_waiting() || events_.wait(deadline + slack)) return false;
   } while (Clock::now() < deadline_.load());
+  return true;
+}
+
+CoreLoop::Clock::duration CoreLoop::calc_slack(Clock::duration duration) {
+  return std::min<Clock::duration>(std::chrono::milliseconds(10), duration / 32);
 }
 
 void CoreLoop::deliver_events(ServerCore& core) {
@@ -61,7 +74,7 @@ void CoreLoop::note_deadline() {
   const sync::Time deadline = core_->next_deadline();
   deadline_ = deadline;
   if (deadline < sleeps_until_.load() || backlog_.is_waiting() ||
-      core_->phase() == ServerCore::Phase::kEnded)
+      core_->phase() != ServerCore::Phase::kAwaitingAnswers)
     events_.interrupt();
 }
 

@@ -51,6 +51,12 @@ RecorderCore::Act RecorderCore::look(const sync::Servers& servers, const Now& no
 RecorderCore::Act RecorderCore::find(const sync::Servers& servers, const Now& now) {
   if (!now.interruption.empty()) return end();
   if (const auto run = find_run(servers, now.time)) return open(*run);
+  const bool was_reset = run_ && !watch_->end().replacement;
+  const auto status = was_reset ? servers.find_status(run_->parameters.run_id()) : nullptr;
+  // A reset can fail after it has ended the run. Its server then has no other one.
+  if (status && status->phase() == RunPhase::PHASE_FAILED)
+    return end(fmt::format("{}: no run after the reset of run {}: {}", options_.folder,
+                           to_text(run_->parameters.run_id()), status->reason().c_str()));
   if (!patience_) patience_.emplace(now.time, limit_s_, sync::kUsualJoinTime);
   const std::string ended = run_ ? to_text(run_->parameters.run_id()) : "";
   if (patience_->is_over(now.time))

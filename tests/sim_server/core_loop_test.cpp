@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "tests/sim_server/core/server_rig.hpp"
+#include "tests/support/waiting.hpp"
 
 namespace sls::sim {
 namespace {
@@ -30,6 +31,7 @@ class Shell : public Outputs, public Surroundings, public Backlog {
   std::uint64_t first_gap = 0;  // the first state that did not follow the one before
   std::uint64_t unrecorded = 0;
   std::atomic<std::uint64_t> replies{0};
+  std::atomic<std::uint64_t> resent{0};
 
   // Outputs: under the lock of the core
   Moment send_states(const Fleet& fleet) override {
@@ -39,7 +41,7 @@ class Shell : public Outputs, public Surroundings, public Backlog {
     step = fleet.step();
     return {std::chrono::steady_clock::now(), std::chrono::system_clock::now()};
   }
-  void resend_states(const Fleet&, const std::function<bool(std::size_t)>&) override {}
+  void resend_states(const Fleet&, const std::function<bool(std::size_t)>&) override { ++resent; }
   void record_step(const Fleet& fleet) override { recorded_end_ = fleet.step() + 1; }
   void record_late(const Vehicle&, const OfferedAnswer&) override {}
   bool is_record_full() const override { return false; }
@@ -114,6 +116,29 @@ SimControl make_request(std::uint64_t run_id, std::uint64_t id, ControlAction ac
   return request;
 }
 
+/// The client's answer to the last state.
+void answer(CoreLoop& loop, const Shell& shell) {
+  loop.put([&](CommandSample& sample) {
+    sample.arrived = {std::chrono::steady_clock::now(), std::chrono::system_clock::now()};
+    sample.written = sample.arrived.wall;
+    sample.run_id = shell.run_id;
+    sample.step = shell.step;
+    sample.answers.resize(1);
+    OfferedAnswer& offered = sample.answers[0];
+    offered.run_id = sample.run_id;
+    offered.step = sample.step;
+    offered.client_name = "pilot";
+    offered.answer.f_Q_W = {0.0, 0.0, -16.66};
+  });
+}
+
+std::unique_ptr<Fleet> make_fleet(const Shell& shell) {
+  return std::make_unique<Fleet>(shell.scenario, std::vector<std::uint32_t>{0}, shell.run_id,
+                                 [](std::size_t count, const auto& work) {
+                                   for (std::size_t i = 0; i < count; ++i) work(i);
+                                 });
+}
+
 TEST(CoreLoopTest, ManyEventsOfFourThreadsLoseNothingAndKeepTheOrder) {
   Shell shell;
   CoreLoop loop(true, shell, shell);
@@ -129,18 +154,7 @@ TEST(CoreLoopTest, ManyEventsOfFourThreadsLoseNothingAndKeepTheOrder) {
           continue;
         }
         answered = shell.step + 1;
-        loop.put([&](CommandSample& sample) {
-          sample.arrived = {std::chrono::steady_clock::now(), std::chrono::system_clock::now()};
-          sample.written = sample.arrived.wall;
-          sample.run_id = shell.run_id;
-          sample.step = shell.step;
-          sample.answers.resize(1);
-          OfferedAnswer& offered = sample.answers[0];
-          offered.run_id = sample.run_id;
-          offered.step = sample.step;
-          offered.client_name = "pilot";
-          offered.answer.f_Q_W = {0.0, 0.0, -16.66};
-        });
+        answer(loop, shell);
         ++events;
       }
     });
@@ -161,11 +175,7 @@ TEST(CoreLoopTest, ManyEventsOfFourThreadsLoseNothingAndKeepTheOrder) {
   });
   std::uint64_t runs = 0, steps = 0;
   while (events < kEvents) {
-    auto fleet = std::make_unique<Fleet>(shell.scenario, std::vector<std::uint32_t>{0},
-                                         shell.run_id, [](std::size_t count, const auto& work) {
-                                           for (std::size_t i = 0; i < count; ++i) work(i);
-                                         });
-    ServerCore core(shell.scenario, {shell.run_id, false, false}, std::move(fleet), shell,
+    ServerCore core(shell.scenario, {shell.run_id, false, false}, make_fleet(shell), shell,
                     std::chrono::steady_clock::now());
     loop.run(core);
     ASSERT_EQ(core.end(), ServerCore::End::kReset) << core.error();
@@ -180,6 +190,39 @@ TEST(CoreLoopTest, ManyEventsOfFourThreadsLoseNothingAndKeepTheOrder) {
   EXPECT_GT(runs, 3u);
   EXPECT_GT(steps, 100u);
   EXPECT_GT(shell.replies, runs) << "of " << requests << " requests";
+}
+
+TEST(CoreLoopTest, TheMainThreadSleepsLongerTheLongerAnswersCame) {
+  EXPECT_EQ(CoreLoop::calc_slack(0ms), 0ms);
+  EXPECT_EQ(CoreLoop::calc_slack(32ms), 1ms);
+  EXPECT_EQ(CoreLoop::calc_slack(320ms), 10ms);
+  EXPECT_EQ(CoreLoop::calc_slack(1h), 10ms);
+}
+
+TEST(CoreLoopTest, AStateIsSentAgainAlsoWhereTheMainThreadSleepsLonger) {
+  Shell shell;
+  CoreLoop loop(true, shell, shell);
+  bool is_resent = false;
+  std::thread client([&] {
+    const auto start = std::chrono::steady_clock::now();
+    for (std::uint64_t answered = 0; std::chrono::steady_clock::now() < start + 500ms;) {
+      if (answered == shell.step + 1) {
+        std::this_thread::yield();
+        continue;
+      }
+      answered = shell.step + 1;
+      answer(loop, shell);
+    }
+    const std::uint64_t before = shell.resent;
+    is_resent = test::wait_until([&] { return shell.resent > before; });
+    loop.put(make_request(shell.run_id, 1, ControlAction::ACTION_STOP));
+  });
+  ServerCore core(shell.scenario, {shell.run_id, false, false}, make_fleet(shell), shell,
+                  std::chrono::steady_clock::now());
+  loop.run(core);
+  client.join();
+  EXPECT_GT(shell.step, 0u);
+  EXPECT_TRUE(is_resent);
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
 """Puts defects into the cores, one at a time, and says which the worlds and the scripts of the cores find.
 
     python3 -B tests/worlds/mutants.py [--build FOLDER] [--seeds N] [--only TEXT] [--no-scripts]
+    python3 -B tests/worlds/mutants.py --check
 
 Each mutant is one change of one line. It is found by the worlds if one of the first N seeds fails, and by the scripts
 if one of the cores' test programs fails, hangs or does not end. The table is printed as Markdown."""
@@ -29,7 +30,7 @@ MUTANTS = [
      "the dead recorder is waited for"),
     ("common/sync/membership.cpp", "announcement.run_id() == run_id && announcement.done()", "announcement.done()",
      "recorders of other runs count as done"),
-    ("common/sync/membership.cpp", "member.announcement.run_id() != run_id;", "false;", "members of other runs are found"),
+    ("common/sync/membership.cpp", "announcement.run_id() == run_id;", "true;", "members of other runs are found"),
     ("common/sync/servers.cpp", "  heard.time = now;\n", "", "a status is no sign of life"),
     ("common/sync/servers.cpp", "  heard.status = sample;\n", "  if (heard.status.run_id() == 0) heard.status = sample;\n",
      "only the first status counts"),
@@ -40,7 +41,7 @@ MUTANTS = [
     ("common/sync/servers.cpp", "(is_dead && is_new)", "is_new", "a living server is replaced"),
     ("common/sync/servers.cpp", "(is_dead && is_new)", "is_dead", "a server that was there before is a replacement"),
     ("common/sync/servers.cpp", "if (other.parameters->run_id() == run_id) continue;", "", "a run is its own successor"),
-    ("common/sync/server_watch.cpp", "if (now - looked_ > kLongestLook) heard_ += now - looked_;", "",
+    ("common/sync/server_watch.cpp", "heard_ += note_look(looked_, now);", "note_look(looked_, now);",
      "the time in which a program was stopped counts as silence"),
     ("common/sync/server_watch.cpp", "heard_ = std::max(heard_, heard.value_or(heard_));", "", "the server is never heard"),
     ("common/sync/server_watch.cpp", "if (wait_->is_over(now)) return Finding::kLost;", "", "no server is ever lost"),
@@ -226,12 +227,17 @@ def main():
     parser.add_argument("--seeds", type=int, default=20_000)
     parser.add_argument("--only", default="", help="mutants whose line or description holds this text")
     parser.add_argument("--no-scripts", action="store_true")
+    parser.add_argument("--check", action="store_true", help="only try whether each mutant fits its file")
     parser.add_argument("--write", type=pathlib.Path, metavar="FILE",
                         help="write the mutated source of the first one chosen into FILE, and end")
     options = parser.parse_args()
     chosen = [mutant for mutant in MUTANTS if options.only in " ".join(mutant)]
     if options.write:
         options.write.write_text(put_in(chosen[0], (ROOT / chosen[0][0]).read_text()))
+        return
+    if options.check:
+        for defect in chosen:
+            put_in(defect, (ROOT / defect[0]).read_text())
         return
     folder = options.build.resolve()
     folder.mkdir(exist_ok=True)

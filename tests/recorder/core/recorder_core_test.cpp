@@ -210,6 +210,17 @@ TEST_F(RecorderCoreTest, TheRunAfterAResetIsWaitedForAsLongAsASilentServer) {
   EXPECT_EQ(core_->error(), "out: no run within 7 s of the reset of run " + kRunText);
 }
 
+TEST_F(RecorderCoreTest, NoRunIsWaitedForAfterAResetThatFailed) {
+  record(0);
+  report(reset_);
+  SimStatus failed = status(kRun, RunPhase::PHASE_FAILED);
+  failed.reason("no thread");
+  servers_->note(failed, kServer, at(20));
+  EXPECT_EQ(look(20), Act::kNone);
+  EXPECT_EQ(core_->phase(), Phase::kEnded);
+  EXPECT_EQ(core_->error(), "out: no run after the reset of run " + kRunText + ": no thread");
+}
+
 TEST_F(RecorderCoreTest, AStopAfterAResetEndsItWithItsGaps) {
   record(0);
   report(reset_, "interrupted by SIGINT");
