@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/bus/node.hpp"
 #include "common/bus/topics.hpp"
 #include "fastdds_api.hpp"
 #include "tests/common/bus/sample_messages.hpp"
