@@ -18,7 +18,6 @@
 
 #include "common/bus/peer.hpp"
 #include "common/bus/problems.hpp"
-#include "common/bus/share.hpp"
 #include "common/bus/topics.hpp"
 
 namespace sls::bus {
@@ -45,6 +44,20 @@ enum class Transports {
   /// port; a viewer that uses only the network cannot block other programs.
   kNetwork
 };
+
+/// Of the samples that a writer writes within `window`, the first `most`. A reader with a share
+/// does not get the others, and the writer does not send them (fastdds/thinning.hpp).
+struct Share {
+  std::uint32_t most = 0;  ///< 0: a reader without a share, which stays so
+  std::chrono::milliseconds window{0};
+
+  friend bool operator==(const Share& a, const Share& b) {
+    return a.most == b.most && a.window == b.window;
+  }
+};
+
+/// All samples, but another share can follow.
+inline constexpr Share kWholeShare{1'000, std::chrono::milliseconds(1)};
 
 /// One DDS participant. Writers and readers must not outlive it.
 class Node {

@@ -13,7 +13,7 @@
 #include <string>
 #include <vector>
 
-#include "common/bus/share.hpp"
+#include "common/bus/node.hpp"
 #include "fastdds_api.hpp"
 
 namespace sls::bus {

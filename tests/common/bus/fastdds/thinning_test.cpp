@@ -17,7 +17,6 @@
 #include <utility>
 #include <vector>
 
-#include "common/bus/node.hpp"
 #include "common/bus/topics.hpp"
 #include "fastdds_api.hpp"
 #include "tests/common/bus/sample_messages.hpp"
