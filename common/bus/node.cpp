@@ -39,7 +39,6 @@
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "common/bus/fastdds/small_datagrams.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
-#include "common/bus/fastdds/thinning.hpp"
 #include "common/bus/fastdds/transports.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/security_files.hpp"
@@ -170,7 +169,7 @@ struct Node::Impl {
     if (participant)
       publisher = participant->create_publisher(dds::PUBLISHER_QOS_DEFAULT),
       subscriber = participant->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
-    if (!participant || !publisher || !subscriber || !know_thinning(*participant))
+    if (!participant || !publisher || !subscriber)
       throw BusError("domain " + std::to_string(domain) +
                      ": cannot join: " + MiddlewareLog::find_first_error());
     self = to_peer(participant->get_instance_handle());
@@ -527,13 +526,12 @@ struct AnyReader::Impl : dds::DataReaderListener, MisfitReport {
   void* sample = nullptr;
   std::vector<std::uint8_t>* raw = nullptr;
   Take take;
-  dds::ContentFilteredTopic* share_of_topic = nullptr;  // null: it takes all samples
   dds::DataReader* reader = nullptr;
   std::optional<SharedDataLock> lock;
 };
 
 AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* type_support,
-                     void* sample, Take take, std::vector<std::uint8_t>* raw, const Share& share)
+                     void* sample, Take take, std::vector<std::uint8_t>* raw)
     : impl_(std::make_unique<Impl>()) {
   dds::TypeSupport type(static_cast<dds::TopicDataType*>(type_support));
   auto* dds_topic = node.impl().find_or_create_topic(topic, type);
@@ -549,14 +547,7 @@ AnyReader::AnyReader(Node& node, const char* topic, const char* profile, void* t
   const bool shares_data = impl_->node->choose_data_sharing(qos);
   if (!(lifespan == kInfinite)) impl_->lifespan = std::chrono::nanoseconds(lifespan.to_ns());
   MiddlewareLog::clear();
-  dds::TopicDescription* source = dds_topic;
-  if (share.most > 0) {
-    source = impl_->share_of_topic = make_share_of(*dds_topic, share);
-    if (!source)
-      throw BusError(std::string(topic) +
-                     ": cannot take a share: " + MiddlewareLog::find_first_error());
-  }
-  impl_->reader = impl_->node->subscriber->create_datareader(source, qos, impl_.get());
+  impl_->reader = impl_->node->subscriber->create_datareader(dds_topic, qos, impl_.get());
   if (!impl_->reader) node.impl().throw_refused_endpoint("read", topic, profile);
   if (shares_data) impl_->lock.emplace(impl_->reader->guid());
   impl_->node->neighbours.add_own(make_facts(*impl_->reader));
@@ -566,22 +557,13 @@ AnyReader::~AnyReader() {
   if (!impl_->reader) return;
   impl_->node->neighbours.drop_own(make_facts(*impl_->reader));
   impl_->reader->set_listener(nullptr);
-  if (impl_->node->is_refused) return;
-  impl_->node->subscriber->delete_datareader(impl_->reader);
-  if (impl_->share_of_topic)
-    impl_->node->participant->delete_contentfilteredtopic(impl_->share_of_topic);
+  if (!impl_->node->is_refused) impl_->node->subscriber->delete_datareader(impl_->reader);
 }
 
 std::set<PeerId> AnyReader::matched() const { return impl_->peers.peers(); }
 std::uint64_t AnyReader::missed_deadlines() const { return impl_->missed_deadlines; }
 std::optional<std::chrono::nanoseconds> AnyReader::lifespan() const { return impl_->lifespan; }
 std::chrono::system_clock::time_point AnyReader::written() const { return impl_->written; }
-
-void AnyReader::change_share(const Share& share) {
-  if (!is_ok(impl_->share_of_topic->set_expression_parameters(to_parameters(share))))
-    throw BusError(impl_->topic +
-                   ": cannot change the share: " + MiddlewareLog::find_first_error());
-}
 
 void AnyReader::ignore_lifespan(bool is_ignored) {
   if (!impl_->lifespan) return;

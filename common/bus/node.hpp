@@ -45,20 +45,6 @@ enum class Transports {
   kNetwork
 };
 
-/// Of the samples that a writer writes within `window`, the first `most`. A reader with a share
-/// does not get the others, and the writer does not send them (fastdds/thinning.hpp).
-struct Share {
-  std::uint32_t most = 0;  ///< 0: a reader without a share, which stays so
-  std::chrono::milliseconds window{0};
-
-  friend bool operator==(const Share& a, const Share& b) {
-    return a.most == b.most && a.window == b.window;
-  }
-};
-
-/// All samples, but another share can follow.
-inline constexpr Share kWholeShare{1'000, std::chrono::milliseconds(1)};
-
 /// One DDS participant. Writers and readers must not outlive it.
 class Node {
  public:
@@ -171,13 +157,12 @@ class AnyReader {
   /// Takes every sample into the buffer `sample` and then calls `take`, on a thread of the
   /// middleware. With `raw`, the undecoded bytes go there and `sample` does not change.
   AnyReader(Node& node, const char* topic, const char* profile, void* type_support, void* sample,
-            Take take, std::vector<std::uint8_t>* raw = nullptr, const Share& share = {});
+            Take take, std::vector<std::uint8_t>* raw = nullptr);
   ~AnyReader();
   std::set<PeerId> matched() const;
   std::uint64_t missed_deadlines() const;
   std::optional<std::chrono::nanoseconds> lifespan() const;
   void ignore_lifespan(bool is_ignored);
-  void change_share(const Share& share);
   std::chrono::system_clock::time_point written() const;
 
  private:
@@ -254,22 +239,18 @@ class Reader {
 };
 
 /// Like Reader, with undecoded samples: plain CDR with its encapsulation header. Only their size is
-/// checked. It may take a share of the samples.
+/// checked.
 template <class Message>
 class RawReader {
  public:
   /// A handler may move the bytes away: the next sample replaces them.
   using Handler = std::function<void(std::vector<std::uint8_t>& cdr, const PeerId& sender)>;
 
-  RawReader(Node& node, const char* profile, Handler handler, const Share& share = {})
+  RawReader(Node& node, const char* profile, Handler handler)
       : handler_(std::move(handler)),
         reader_(
             node, Topic<Message>::kName, profile, detail::make_type_support<Message>(),
-            unused_.get(), [this](const PeerId& sender) { handler_(cdr_, sender); }, &cdr_, share) {
-  }
-
-  /// From now on, as soon as the writers know it. Requires a share.
-  void change_share(const Share& share) { reader_.change_share(share); }
+            unused_.get(), [this](const PeerId& sender) { handler_(cdr_, sender); }, &cdr_) {}
 
   /// Participants with a writer that is matched with this reader.
   std::set<PeerId> matched() const { return reader_.matched(); }

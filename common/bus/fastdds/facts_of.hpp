@@ -5,7 +5,6 @@
 #include <fastdds/dds/publisher/qos/DataWriterQos.hpp>
 #include <fastdds/dds/subscriber/DataReader.hpp>
 #include <fastdds/dds/subscriber/qos/DataReaderQos.hpp>
-#include <fastdds/dds/topic/ContentFilteredTopic.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 
 #include <algorithm>
@@ -65,11 +64,8 @@ inline EndpointFacts make_facts(const dds::DataWriter& writer) {
 }
 inline EndpointFacts make_facts(const dds::DataReader& reader) {
   EndpointFacts facts;
-  const dds::TopicDescription* topic = reader.get_topicdescription();
-  if (const auto* share = dynamic_cast<const dds::ContentFilteredTopic*>(topic))
-    topic = share->get_related_topic();
-  facts.topic = topic->get_name();
-  facts.type = topic->get_type_name();
+  facts.topic = reader.get_topicdescription()->get_name();
+  facts.type = reader.get_topicdescription()->get_type_name();
   const auto& qos = reader.get_qos();
   detail::fill(facts, qos.reliability(), qos.durability(), qos.deadline(), qos.liveliness(),
                qos.ownership());

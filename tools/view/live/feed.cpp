@@ -7,7 +7,6 @@
 #include <thread>
 #include <utility>
 
-#include "tools/view/live/page_frames.hpp"
 #include "tools/view/live/run_watch.hpp"
 #include "tools/view/live/sample_queue.hpp"
 
@@ -23,11 +22,6 @@ constexpr auto kLongestQuiet = 1s;  // period of the view without a change
 // Between two deliveries in lockstep. There the loop runs as fast as the processors allow, and each
 // delivery takes processor time from it.
 constexpr auto kLockstepPeriod = 50ms;
-// Batches of sls/record that pages get in that time: so many that each vehicle of a step is among
-// them, wherever the first one begins, and enough rows for the plots.
-constexpr std::size_t kVehiclesOfBatch = 8;
-constexpr std::size_t kLeastBatches = PageFrames::kMostRowBatches;
-constexpr std::size_t kMostBatches = PageFrames::kMostBatches;
 constexpr std::size_t kLatchedSamples = 256;  // of one topic
 
 std::int64_t to_ns(std::chrono::system_clock::time_point time) {
@@ -36,49 +30,73 @@ std::int64_t to_ns(std::chrono::system_clock::time_point time) {
 
 struct AnyTopicReader {
   virtual ~AnyTopicReader() = default;
-  virtual void change_share(const bus::Share& share) = 0;
 };
 
 using Put = std::function<void(Sample)>;
+
+/// Makes fast samples wait in the socket, so that the middleware's thread takes many at a time. In
+/// lockstep each wake-up of that thread takes a processor from the loop for longer than its work
+/// (README.md). Samples that do not fit into the socket are lost to this reader only.
+class Rests {
+ public:
+  /// Call it for each sample, before passing the sample on; from one thread.
+  void rest_if_busy() {
+    const auto now = Clock::now();
+    ++samples_;
+    if (now < window_end_) return;
+    const bool is_busy = samples_ > kMostSamples;
+    samples_ = 0;
+    window_end_ = now + (is_busy ? kWholeRest + kWindow : kWholeRest);
+    if (is_busy) std::this_thread::sleep_for(kWholeRest);
+  }
+
+ private:
+  static constexpr int kMostSamples = 8;  // in a window
+  static constexpr auto kWholeRest = 45ms;
+  static constexpr auto kWindow = 5ms;  // for samples that have waited
+
+  Clock::time_point window_end_{};
+  int samples_ = 0;
+};
 
 /// Passes every sample of a topic to `put`, on a thread of the middleware.
 template <class Message>
 class TopicReader : public AnyTopicReader {
  public:
-  TopicReader(bus::Node& node, TopicId topic, const Put& put, const bus::Share& share)
-      : reader_(
-            node, is_latched(topic) ? bus::kLatchedReaderProfile : bus::kLoopReaderProfile,
-            [this, topic, &put](std::vector<std::uint8_t>& cdr, const bus::PeerId& sender) {
-              put({topic, std::make_shared<const std::vector<std::uint8_t>>(std::move(cdr)),
-                   to_ns(reader_.written()), sender});
-            },
-            share) {}
-
-  void change_share(const bus::Share& share) override { reader_.change_share(share); }
+  /// `may_rest`: true while no listener requires every sample of sls/record.
+  TopicReader(bus::Node& node, TopicId topic, const Put& put, const std::atomic<bool>& may_rest)
+      : reader_(node, is_latched(topic) ? bus::kLatchedReaderProfile : bus::kLoopReaderProfile,
+                [this, topic, &put, &may_rest](std::vector<std::uint8_t>& cdr,
+                                               const bus::PeerId& sender) {
+                  if (topic == TopicId::kRecord && may_rest) rests_.rest_if_busy();
+                  put({topic, std::make_shared<const std::vector<std::uint8_t>>(std::move(cdr)),
+                       to_ns(reader_.written()), sender});
+                }) {}
 
  private:
-  bus::RawReader<Message> reader_;
+  Rests rests_;
+  bus::RawReader<Message> reader_;  // last: it uses the member above
 };
 
 std::unique_ptr<AnyTopicReader> make_reader(bus::Node& node, TopicId topic, const Put& put,
-                                            const bus::Share& share) {
+                                            const std::atomic<bool>& may_rest) {
   switch (topic) {
     case TopicId::kState:
-      return std::make_unique<TopicReader<States>>(node, topic, put, share);
+      return std::make_unique<TopicReader<States>>(node, topic, put, may_rest);
     case TopicId::kCommand:
-      return std::make_unique<TopicReader<Commands>>(node, topic, put, share);
+      return std::make_unique<TopicReader<Commands>>(node, topic, put, may_rest);
     case TopicId::kRecord:
-      return std::make_unique<TopicReader<RecordBatch>>(node, topic, put, share);
+      return std::make_unique<TopicReader<RecordBatch>>(node, topic, put, may_rest);
     case TopicId::kParticipant:
-      return std::make_unique<TopicReader<Participant>>(node, topic, put, share);
+      return std::make_unique<TopicReader<Participant>>(node, topic, put, may_rest);
     case TopicId::kParameters:
-      return std::make_unique<TopicReader<Parameters>>(node, topic, put, share);
+      return std::make_unique<TopicReader<Parameters>>(node, topic, put, may_rest);
     case TopicId::kStatus:
-      return std::make_unique<TopicReader<SimStatus>>(node, topic, put, share);
+      return std::make_unique<TopicReader<SimStatus>>(node, topic, put, may_rest);
     case TopicId::kControl:
-      return std::make_unique<TopicReader<SimControl>>(node, topic, put, share);
+      return std::make_unique<TopicReader<SimControl>>(node, topic, put, may_rest);
     case TopicId::kControlReply:
-      return std::make_unique<TopicReader<SimControlReply>>(node, topic, put, share);
+      return std::make_unique<TopicReader<SimControlReply>>(node, topic, put, may_rest);
   }
   return nullptr;
 }
@@ -205,7 +223,7 @@ struct Feed::Impl {
 
   void note_run(const std::shared_ptr<const RunView>& run) {
     view = run;
-    update_record_share();
+    update_rests();
     for_each([&](Listener& listener) { listener.note(view.get()); });
   }
 
@@ -221,34 +239,20 @@ struct Feed::Impl {
            (topic == TopicId::kRecord && !listeners.empty());
   }
 
+  /// Readers may rest if the flight is in lockstep and only pages read, which need only the newest
+  /// samples.
+  void update_rests() {
+    const bool is_any_wanted =
+        std::any_of(wanted.begin(), wanted.end(), [](int count) { return count > 0; });
+    may_rest = !is_any_wanted && view && view->run.parameters.mode() == SyncMode::MODE_LOCKSTEP;
+  }
+
   void update_reader(TopicId topic) {
     auto& reader = readers[static_cast<std::size_t>(topic)];
     if (!is_read(topic))
       reader.reset();
     else if (!reader)
-      reader = make_reader(node, topic, put_sample,
-                           topic == TopicId::kRecord ? record_share : bus::Share());
-  }
-
-  /// In lockstep pages need a share of sls/record: each batch costs the server and the viewer
-  /// processor time, which is missing in the loop (README.md).
-  bus::Share choose_record_share() const {
-    const bool is_any_wanted =
-        std::any_of(wanted.begin(), wanted.end(), [](int count) { return count > 0; });
-    if (is_any_wanted || (view && view->run.parameters.mode() != SyncMode::MODE_LOCKSTEP))
-      return bus::kWholeShare;
-    const std::size_t vehicles = view ? view->run.parameters.vehicles().size() : 1;
-    const auto batches = static_cast<std::uint32_t>(
-        std::clamp(vehicles / kVehiclesOfBatch + 2, kLeastBatches, kMostBatches));
-    return {batches, kLockstepPeriod};
-  }
-
-  void update_record_share() {
-    const bus::Share share = choose_record_share();
-    if (share == record_share) return;
-    record_share = share;
-    if (const auto& reader = readers[static_cast<std::size_t>(TopicId::kRecord)])
-      reader->change_share(share);
+      reader = make_reader(node, topic, put_sample, may_rest);
   }
 
   bus::Node& node;
@@ -258,13 +262,13 @@ struct Feed::Impl {
   SampleQueue queue{kMostQueuedBytes};
   std::atomic<bool> is_status_new{false};
   std::atomic<bool> is_ending{false};
+  std::atomic<bool> may_rest{false};
   RunWatch watch;              // used by `thread` only
   Clock::time_point looked{};  // likewise
   Clock::time_point told{};    // likewise
 
   std::vector<Listener*> listeners;
   std::array<int, kTopics> wanted{};
-  bus::Share record_share{kLeastBatches, kLockstepPeriod};
   std::array<std::vector<Sample>, kTopics> latched;
   std::shared_ptr<const RunView> view;
   std::deque<RunEvent> past_events;
@@ -293,13 +297,13 @@ void Feed::remove(Listener& listener) {
 
 void Feed::want(TopicId topic) {
   ++impl_->wanted[static_cast<std::size_t>(topic)];
-  impl_->update_record_share();
+  impl_->update_rests();
   impl_->update_reader(topic);
 }
 
 void Feed::unwant(TopicId topic) {
   --impl_->wanted[static_cast<std::size_t>(topic)];
-  impl_->update_record_share();
+  impl_->update_rests();
   impl_->update_reader(topic);
 }
 

@@ -41,11 +41,9 @@ inline constexpr const char* kMiddlewareVersion = FASTRTPS_VERSION_STR;
 /// Environment variable that names a file of profiles.
 inline constexpr const char* kProfilesVariable = "FASTRTPS_DEFAULT_PROFILES_FILE";
 
-using ReturnCode = eprosima::fastrtps::types::ReturnCode_t;
-inline const ReturnCode kOk = ReturnCode::RETCODE_OK;
-inline const ReturnCode kBadParameter = ReturnCode::RETCODE_BAD_PARAMETER;
-
-inline bool is_ok(const ReturnCode& code) { return code == ReturnCode::RETCODE_OK; }
+inline bool is_ok(const eprosima::fastrtps::types::ReturnCode_t& code) {
+  return code == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK;
+}
 
 inline bool write_sample(dds::DataWriter& writer, const void* sample) {
   return writer.write(const_cast<void*>(sample));  // it is only read

@@ -36,11 +36,7 @@ inline constexpr const char* kMiddlewareVersion = FASTDDS_VERSION_STR;
 /// Environment variable that names a file of profiles.
 inline constexpr const char* kProfilesVariable = "FASTDDS_DEFAULT_PROFILES_FILE";
 
-using ReturnCode = dds::ReturnCode_t;
-inline constexpr ReturnCode kOk = dds::RETCODE_OK;
-inline constexpr ReturnCode kBadParameter = dds::RETCODE_BAD_PARAMETER;
-
-inline bool is_ok(ReturnCode code) { return code == kOk; }
+inline bool is_ok(dds::ReturnCode_t code) { return code == dds::RETCODE_OK; }
 
 inline bool write_sample(dds::DataWriter& writer, const void* sample) {
   return is_ok(writer.write(sample));

@@ -3,10 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include <chrono>
 #include <functional>
 #include <set>
-#include <utility>
 
 #include "tests/support/own_domain.hpp"
 #include "tests/tools/view/live/binary_message.hpp"
@@ -425,36 +423,6 @@ TEST_F(PageProtocolTest, StatesAreReadOnlyWhileTheyAreWanted) {
   EXPECT_TRUE(server.is_state_read_by(node));
   feed.unwant(TopicId::kState);
   EXPECT_TRUE(wait_until([&] { return !server.is_state_read_by(node); }));
-  feed.remove(counter);
-}
-
-TEST_F(PageProtocolTest, PagesGetAShareOfALockstepFlightAndOthersAllOfIt) {
-  using Clock = std::chrono::steady_clock;
-  Counter counter;
-  feed.add(counter);
-  FakeServer server(domain.number(), 1);
-  const int& count = counter.counts[static_cast<std::size_t>(TopicId::kRecord)];
-  ASSERT_TRUE(write_until([&] { return count > 0; }, server, make_batch(1, 0, 0)));
-  int before = count, written = 0;
-  const auto start = Clock::now();
-  while (Clock::now() < start + std::chrono::milliseconds(500)) {
-    for (int i = 0; i < 20; ++i, ++written) server.write(make_batch(1, 0, 0));
-    thread.run_all();
-  }
-  const double windows = std::chrono::duration<double>(Clock::now() - start).count() / 0.05;
-  ASSERT_TRUE(wait_until([&] { return count > before; }));
-  EXPECT_GT(written, 8 * windows) << "the share is not tried";
-  EXPECT_LE(count - before, 4 * (windows + 2));
-
-  feed.want(TopicId::kState);
-  ASSERT_TRUE(wait_until([&] { return server.is_state_read_by(node); }));
-  before = count;
-  ASSERT_TRUE(wait_until([&] {  // until the writer knows the new reader, and then more than a share
-    for (int i = 0; i < 20; ++i) server.write(make_batch(1, 0, 0));
-    const int now = count;
-    return std::exchange(before, now) + 20 <= now;
-  }));
-  feed.unwant(TopicId::kState);
   feed.remove(counter);
 }
 
