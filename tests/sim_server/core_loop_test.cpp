@@ -204,12 +204,16 @@ TEST(CoreLoopTest, AStateIsSentAgainAlsoWhereTheMainThreadSleepsLonger) {
   CoreLoop loop(true, shell, shell);
   bool is_resent = false;
   std::thread client([&] {
-    const auto start = std::chrono::steady_clock::now();
-    for (std::uint64_t answered = 0; std::chrono::steady_clock::now() < start + 500ms;) {
-      if (answered == shell.step + 1) {
+    const auto limit = std::chrono::steady_clock::now() + 30s;
+    auto end = limit;  // half a second after the first step
+    std::uint64_t answered = 0, resent = 0;
+    while (std::chrono::steady_clock::now() < end) {
+      if (end == limit && shell.step > 0) end = std::chrono::steady_clock::now() + 500ms;
+      if (answered == shell.step + 1 && resent == shell.resent) {
         std::this_thread::yield();
         continue;
       }
+      resent = shell.resent;
       answered = shell.step + 1;
       answer(loop, shell);
     }
