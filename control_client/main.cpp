@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
     // Refuses a law that cannot be made before other programs wait for this client.
     control::FlightController(config::make_vehicle_scenario(scenario, vehicle_ids.front()),
                               vehicle_ids.front());
-    bus::Node node(options.qos_file, options.domain, "control_client", kIdentity);
+    bus::Node node(options.qos_file, options.domain, bus::kClientNode, kIdentity);
     control::Client(node, scenario, vehicle_ids, client).run();
   });
   if (!plugin::is_any_loaded()) bus::end_process(code);

@@ -57,7 +57,7 @@ int main(int argc, char** argv) {
     // The loop waits for server and client, not for the recorder, so those have priority. Set
     // before any thread starts, because threads inherit it. A refusal does no harm.
     app::put_thread_last();
-    bus::Node node(options.qos_file, options.domain, "recorder", kIdentity,
+    bus::Node node(options.qos_file, options.domain, bus::kRecorderNode, kIdentity,
                    bus::Transports::kAllWithLongQueue);
     record::Recorder(node, recorder).run();
   });

@@ -22,7 +22,8 @@ using Clock = std::chrono::steady_clock;
 }  // namespace
 
 ParticipantDirectory::ParticipantDirectory(Node& node)
-    : reader_(node, kLatchedReaderProfile,
+    : node_(node),
+      reader_(node, kLatchedReaderProfile,
               [this, &node](const Participant& sample, const PeerId& sender) {
                 node.note_announced_name(sender, sample.name().to_string());
                 note(sample, sender);
@@ -54,6 +55,15 @@ std::vector<sync::Member> ParticipantDirectory::find(ParticipantRole role,
 
 std::vector<sync::Member> ParticipantDirectory::all() const {
   return ask([](const sync::Membership& members) { return members.all(); });
+}
+
+bool ParticipantDirectory::has_heard_everyone() const {
+  if (!node_.has_discovered_this_machine()) return false;
+  std::set<PeerId> awaited = reader_.matched();
+  awaited.merge(node_.find_named(kClientNode));
+  awaited.merge(node_.find_named(kRecorderNode));
+  for (const sync::Member& member : all()) awaited.erase(member.peer);
+  return awaited.empty();
 }
 
 int ParticipantDirectory::count_done(ParticipantRole role, std::uint64_t run_id) const {

@@ -22,6 +22,11 @@
 
 namespace sls::bus {
 
+/// Names of the nodes of our programs: others recognise them before they hear an announcement.
+inline constexpr const char* kServerNode = "sim_server";
+inline constexpr const char* kClientNode = "control_client";
+inline constexpr const char* kRecorderNode = "recorder";
+
 /// sync::Membership of a domain.
 class ParticipantDirectory {
  public:
@@ -32,6 +37,11 @@ class ParticipantDirectory {
   int count_done(ParticipantRole role, std::uint64_t run_id) const;
   std::uint64_t version() const { return version_.load(std::memory_order_acquire); }
 
+  /// True if this node has discovered every participant on this machine and heard an announcement
+  /// of each that it has discovered: of each writer of sls/participant, and of each node
+  /// kClientNode or kRecorderNode.
+  bool has_heard_everyone() const;
+
   /// Participants with a writer of sls/participant, also those without an announcement yet.
   std::set<PeerId> writers() const { return reader_.matched(); }
 
@@ -41,6 +51,7 @@ class ParticipantDirectory {
   template <class Use>
   auto ask(Use use) const;
 
+  const Node& node_;
   mutable std::mutex mutex_;
   mutable sync::Membership members_;
   std::atomic<std::uint64_t> version_{0};
@@ -71,9 +82,6 @@ class Announcer {
 /// Waits as sync::RecordersEnd says for the recorders of run `run_id`. Logs those that are missing.
 void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
                                int expected, const sync::RecorderPatience& patience = {});
-
-/// Name of a server's node: others recognise it before they hear its claim.
-inline constexpr const char* kServerNode = "sim_server";
 
 /// sync::Servers of a domain.
 class ServerDirectory {

@@ -128,7 +128,7 @@ class PythonClient {
     std::exception_ptr failure;
     try {
       app::start_log("sls.Client", log_level_);
-      bus::Node node(qos_file_, domain_, "control_client", kIdentity);
+      bus::Node node(qos_file_, domain_, bus::kClientNode, kIdentity);
       control::Client(node, scenario_, vehicle_ids_, options_).run();
     } catch (const bus::BusError& error) {
       failure = std::make_exception_ptr(app::RunError(error.what()));

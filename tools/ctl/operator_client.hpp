@@ -61,6 +61,9 @@ class OperatorClient {
   std::optional<SimControlReply> find_reply(Question& question,
                                             std::chrono::steady_clock::time_point deadline);
 
+  /// True if the announcement of every participant that can be known to exist has arrived.
+  bool has_heard_everyone() const { return participants_.has_heard_everyone(); }
+
   /// The data of `run` that have arrived so far.
   Snapshot make_snapshot(const sync::Run& run) const;
 

@@ -1,6 +1,7 @@
 #include "tools/ctl/show_status.hpp"
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
 
 #include <chrono>
 #include <optional>
@@ -20,8 +21,9 @@ using Clock = std::chrono::steady_clock;
 
 constexpr auto kRedrawTime = 250ms;
 constexpr auto kLineTime = 1s;
-/// Discovery finds the participants of a run about as soon as their server.
+/// Discovery finds the participants of a run about as soon as their server, if no packet is lost.
 constexpr auto kDiscoveryTime = 400ms;
+constexpr auto kLongestDiscovery = 3s;
 constexpr auto kFreshTime = 1500ms;  // a healthy server publishes every 0.5 s
 constexpr std::size_t kFileColumns = 160;
 
@@ -31,24 +33,36 @@ void check_written(const std::ostream& out) {
 
 bool is_interrupted() { return app::stop_signal() != 0; }
 
-/// `run` with a status published after discovery, if one comes within kFreshTime; otherwise with
-/// the status that the server keeps for late joiners.
+/// Waits until the announcements of all participants have come.
+void wait_for_discovery(const OperatorClient& client) {
+  const auto began = Clock::now();
+  while (!is_interrupted()) {
+    std::this_thread::sleep_for(app::kPollTime);
+    const auto passed = Clock::now() - began;
+    if (passed >= kDiscoveryTime && client.has_heard_everyone()) return;
+    if (passed < kLongestDiscovery) continue;
+    spdlog::warn("not every participant was heard within 3 s: some may be missing below");
+    return;
+  }
+}
+
+/// `run` with a status published from now on, if one comes within kFreshTime; otherwise with the
+/// status that the server keeps for late joiners.
 sync::Run wait_for_fresh_status(const OperatorClient& client, sync::Run run) {
   const auto began = Clock::now();
-  std::optional<std::uint64_t> left;  // sample_index when discovery was over
+  run = client.refresh(run);
+  const std::uint64_t left = run.status->sample_index();
   while (!is_interrupted() && Clock::now() - began < kFreshTime) {
     std::this_thread::sleep_for(app::kPollTime);
     run = client.refresh(run);
-    if (Clock::now() - began < kDiscoveryTime) continue;
-    if (has_ended(run.status)) break;
-    if (!left) left = run.status->sample_index();
-    if (run.status->sample_index() != *left) break;
+    if (has_ended(run.status) || run.status->sample_index() != left) break;
   }
   return run;
 }
 
 void show_once(const OperatorClient& client, const ShowOptions& options, sync::Run run,
                std::ostream& out) {
+  wait_for_discovery(client);
   run = wait_for_fresh_status(client, std::move(run));
   if (is_interrupted()) return;
   const Snapshot snapshot = client.make_snapshot(run);

@@ -2,6 +2,8 @@
 #include "tools/ctl/operator_client.hpp"
 
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
 #include <atomic>
 #include <functional>
@@ -309,6 +311,30 @@ TEST_F(OperatorClientTest, ASnapshotHoldsThePartiesOfTheRunAndTheServersSilence)
   server.is_silent = true;
   EXPECT_TRUE(wait_until([&] { return client.make_snapshot(run).silence_s > 0.2; }));
   EXPECT_FALSE(client.make_snapshot(run).server_is_gone);
+}
+
+TEST_F(OperatorClientTest, EveryoneIsHeardOnceEachProgramThatWasFoundHasAnnouncedItself) {
+  bus::Node found(kQosFile, own_domain(), bus::kClientNode);
+  ASSERT_TRUE(wait_until([&] { return node.find_named(bus::kClientNode).size() == 1; }));
+  EXPECT_FALSE(client.has_heard_everyone());
+  bus::Writer<Participant> writer(found);
+  writer.write(Participant());
+  EXPECT_TRUE(wait_until([&] { return client.has_heard_everyone(); }));
+}
+
+TEST_F(OperatorClientTest, AStatusSaysThatAParticipantMayBeMissing) {
+  FakeServer server(kAccept);
+  const bus::Node mute(kQosFile, own_domain(), bus::kRecorderNode);
+  ASSERT_TRUE(wait_until([&] { return node.find_named(bus::kRecorderNode).size() == 1; }));
+  std::ostringstream log, out;
+  const auto previous = spdlog::default_logger();
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+      "test", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
+  show_status(client, ShowOptions(), out);
+  spdlog::set_default_logger(previous);
+  EXPECT_NE(log.str().find("not every participant was heard within 3 s"), std::string::npos)
+      << log.str();
+  EXPECT_NE(out.str().find("no participants"), std::string::npos) << out.str();
 }
 
 // A view runs for days, and each reset begins a run.
