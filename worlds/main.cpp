@@ -19,6 +19,8 @@ namespace {
 
 using namespace sls;
 
+constexpr auto kLongestShrinking = std::chrono::seconds(60);
+
 /// Files of worlds are in memory: a world writes and reads them in milliseconds.
 class Folder {
  public:
@@ -162,10 +164,18 @@ int main(int argc, char** argv) {
     }
     if (result.failures.empty() || app::stop_signal() != 0) return;
     const std::uint64_t first = result.failures.begin()->first;
-    std::cout << fmt::format("the world of seed {}, without what it does not need:\n", first);
-    print_story(worlds::shrink(worlds::draw_plan(first, scenarios, options.cases), scenarios,
-                               folder.path() / "shrink"),
-                scenarios, folder.path() / "tell");
+    std::cout << fmt::format("the world of seed {}, without what it does not need:\n", first)
+              << std::flush;
+    const auto give_up = std::chrono::steady_clock::now() + kLongestShrinking;
+    bool is_over = false;
+    const worlds::Plan smallest = worlds::shrink(
+        worlds::draw_plan(first, scenarios, options.cases), scenarios, folder.path() / "shrink",
+        [&] {
+          is_over |= app::stop_signal() != 0 || std::chrono::steady_clock::now() >= give_up;
+          return is_over;
+        });
+    if (is_over) std::cout << "  (the search for what it does not need was ended)\n";
+    print_story(smallest, scenarios, folder.path() / "tell");
     std::cout << std::flush;  // the error comes last
     throw app::RunError(
         fmt::format("{} of {} worlds failed", result.failures.size(), result.worlds));

@@ -123,8 +123,8 @@ class Search {
 class Shrinker {
  public:
   Shrinker(const Plan& plan, const std::vector<FlownScenario>& scenarios,
-           const std::filesystem::path& folder)
-      : scenarios_(scenarios), folder_(folder), plan_(plan) {
+           const std::filesystem::path& folder, const std::function<bool()>& is_over)
+      : scenarios_(scenarios), folder_(folder), is_over_(is_over), plan_(plan) {
     const auto findings = fly_world(plan, scenarios, folder).findings;
     if (!findings.empty()) broken_ = strip_numbers(findings.front());
   }
@@ -167,6 +167,7 @@ class Shrinker {
  private:
   template <class Change>
   bool attempt(const Change& change) {
+    if (is_over_()) return false;
     Plan smaller = plan_;
     change(smaller);
     const auto findings = fly_world(smaller, scenarios_, folder_).findings;
@@ -179,6 +180,7 @@ class Shrinker {
 
   const std::vector<FlownScenario>& scenarios_;
   const std::filesystem::path folder_;
+  const std::function<bool()>& is_over_;
   Plan plan_;
   std::string broken_;
 };
@@ -228,8 +230,8 @@ SearchResult search(const std::vector<FlownScenario>& scenarios, const SearchOpt
 }
 
 Plan shrink(const Plan& plan, const std::vector<FlownScenario>& scenarios,
-            const std::filesystem::path& folder) {
-  return Shrinker(plan, scenarios, folder).run();
+            const std::filesystem::path& folder, const std::function<bool()>& is_over) {
+  return Shrinker(plan, scenarios, folder, is_over).run();
 }
 
 std::vector<std::string> tell(const Plan& plan, const std::vector<FlownScenario>& scenarios,

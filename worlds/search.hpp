@@ -70,9 +70,10 @@ SearchResult search(const std::vector<FlownScenario>& scenarios, const SearchOpt
                     const std::function<void(const SearchResult&)>& report);
 
 /// The smallest plan that still breaks a property that `plan` breaks: without faults, programs and
-/// noise that it does not need.
+/// noise that it does not need. Once `is_over()`, the smallest that was found: it is asked before
+/// each world.
 Plan shrink(const Plan& plan, const std::vector<FlownScenario>& scenarios,
-            const std::filesystem::path& folder);
+            const std::filesystem::path& folder, const std::function<bool()>& is_over);
 
 /// The world of `plan` in at most 40 lines: what it is made of, and the events before the finding.
 std::vector<std::string> tell(const Plan& plan, const std::vector<FlownScenario>& scenarios,
