@@ -133,6 +133,16 @@ show_progress() {
   done >"$1"
 }
 
+# configure PRESET [--fresh]: if the tree has another compiler than the preset, CMake would keep none of the preset's
+# values, and leave out a sanitizer. Then the tree is made anew.
+configure() {
+  local said status=0
+  said="$(cmake --preset "$@" 2>&1)" || status=$?
+  printf '%s\n' "$said"
+  [[ $said != *'require your cache to be deleted'* ]] || { cmake --preset "$1" --fresh; return; }
+  return "$status"
+}
+
 # build_tree PRESET FOLDER [TARGET…]: configures and builds; all targets by default.
 build_tree() {
   local preset=$1 folder=$2 targets=() fresh=() lock
@@ -146,7 +156,7 @@ build_tree() {
     rm -f "$folder/Makefile"  # of earlier versions, which built with make
     say "building for the first time, which takes minutes (log: $folder/build.log)"
   fi
-  if ! { (cd "$root" && cmake --preset "$preset" "${fresh[@]}") &&
+  if ! { (cd "$root" && configure "$preset" "${fresh[@]}") &&
     NINJA_STATUS='[%f/%t] ' cmake --build "$folder" --parallel "$(nproc)" "${targets[@]}"; } 2>&1 |
       show_progress "$folder/build.log"; then
     local reason

@@ -156,6 +156,17 @@ class BuildTest(unittest.TestCase):
         self.expect_built("flag")
         self.expect_not_built("flag")
 
+    def test_a_preset_with_another_compiler_keeps_its_values(self):
+        self.expect_built("first")
+        (self.folder / "bin/other_cc").symlink_to(shutil.which("cc"))
+        presets = (self.root / "CMakePresets.json").read_text()
+        self.write("CMakePresets.json", presets.replace(
+            '"CMAKE_BUILD_TYPE": "Release"',
+            r'"CMAKE_C_COMPILER": "other_cc", "CMAKE_C_FLAGS": "-DTEXT=\\\"other\\\""'))
+        self.write("text.h", "")
+        self.expect_built("other")
+        self.expect_not_built("other")
+
     def test_a_first_flight_builds_what_it_needs_and_a_whole_tree_stays_whole(self):
         self.assertIn("cmake --preset flight --fresh", self.expect_flight("first"))
         done = subprocess.run([self.root / "sls", "verify"], env=self.environment, cwd=self.folder, capture_output=True,
