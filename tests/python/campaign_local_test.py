@@ -214,6 +214,24 @@ class LocalEngineTest(CampaignTest):
         self.expect_line(said, "mine: expected a new or empty folder, got one that holds 'letter.txt'")
         self.assertEqual(os.listdir(self.folder / "mine"), ["letter.txt"])
 
+    def test_resume_waits_for_a_collect_job_alone(self):
+        from sls.campaign.folder import COLLECT_JOB, CampaignFolder
+        from sls.input_error import InputError
+        for owner, waits in ((COLLECT_JOB, True), ("", False)):
+            with self.subTest(owner=owner):
+                first, second = CampaignFolder(self.folder), CampaignFolder(self.folder)
+                first.take_lock(owner)
+                with unittest.mock.patch("sls.campaign.folder.time.sleep", lambda _: first.close()):
+                    if waits:
+                        second.take_lock(patience_s=60.0)
+                        first = second
+                    else:
+                        with self.assertRaisesRegex(InputError, f"in use by process {os.getpid()} on "):
+                            second.take_lock(patience_s=60.0)
+                with self.assertRaisesRegex(InputError, "in use by process"):
+                    CampaignFolder(self.folder).take_lock()
+                first.close()
+
     def test_another_kind_of_machine_is_refused_unless_allowed_and_then_named(self):
         self.write_campaign(40)
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)

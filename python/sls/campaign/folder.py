@@ -9,6 +9,7 @@ import json
 import os
 import re
 import shutil
+import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, field, replace
@@ -23,6 +24,8 @@ from sls.campaign.used_files import refuse_changed_files
 from sls.campaign.whole_files import WholeFile, is_left_over, write_whole
 from sls.input_error import InputError
 
+COLLECT_JOB = "collect job, "  # the lock's text begins so if a collect job holds it: slurm.py
+COLLECT_S = 60.0              # --resume waits for it so long
 OWN_FILES = {"lock", "campaign.yaml", "base.yaml", "chunks", "kept"}  # files that may exist before plan.json
 
 
@@ -106,7 +109,7 @@ class CampaignFolder:
         campaign, is in use, or was begun on a machine of another kind."""
         self.refuse_foreign(campaign, resume)
         self.make_folders()
-        self.take_lock()
+        self.take_lock(patience_s=COLLECT_S if resume else 0.0)
         self.refuse_foreign(campaign, resume)  # another process may have begun it meanwhile
         if (self.folder / "plan.json").exists():
             self.take_up(campaign, engine, first, last, list(columns), allow_other_machines)
@@ -198,9 +201,10 @@ class CampaignFolder:
 
     # --- the lock ---------------------------------------------------------------------------------
 
-    def take_lock(self) -> None:
+    def take_lock(self, owner: str = "", patience_s: float = 0.0) -> None:
         """Locks the folder, because only one process may plan and collect. The kernel frees the lock when
-        that process ends. Raises InputError if another process holds it."""
+        that process ends. `owner` says to others what this process is. Raises InputError if another
+        process holds it, a collect job for longer than `patience_s`: it ends soon."""
         if self._lock is not None:
             return
         file = self.folder / "lock"
@@ -208,18 +212,25 @@ class CampaignFolder:
             lock = os.open(file, os.O_RDWR | os.O_CREAT, 0o666)
         except OSError as error:
             raise InputError(f"{file}: expected to write it, got: {error.strerror}") from None
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError as error:
-            holder = os.read(lock, 200).decode(errors="replace").strip()
-            os.close(lock)
-            if error.errno not in (errno.EWOULDBLOCK, errno.EACCES):
-                raise InputError(f"{file}: expected to lock it, got: {error.strerror}") from None
-            raise InputError(f"{self.folder}: expected a folder that no other campaign uses, got "
-                             f"one in use by {holder or 'another process'}") from None
+        give_up = time.monotonic() + patience_s
+        while True:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except OSError as error:
+                holder = os.pread(lock, 200, 0).decode(errors="replace").strip()
+                is_held = error.errno in (errno.EWOULDBLOCK, errno.EACCES)
+                if is_held and holder.startswith(COLLECT_JOB) and time.monotonic() < give_up:
+                    time.sleep(0.1)
+                    continue
+                os.close(lock)
+                if not is_held:
+                    raise InputError(f"{file}: expected to lock it, got: {error.strerror}") from None
+                raise InputError(f"{self.folder}: expected a folder that no other campaign uses, got "
+                                 f"one in use by {holder or 'another process'}") from None
         try:
             os.ftruncate(lock, 0)
-            os.pwrite(lock, f"process {os.getpid()} on {host_name()}\n".encode(), 0)
+            os.pwrite(lock, f"{owner}process {os.getpid()} on {host_name()}\n".encode(), 0)
         except OSError:  # the disk is full: the lock holds without this text
             pass
         self._lock = lock

@@ -21,7 +21,7 @@ from pathlib import Path
 
 from sls.campaign.engines import EngineError, EngineOptions
 from sls.campaign.engines.cluster import describe_rest, find_missing, find_places
-from sls.campaign.folder import CampaignFolder, DamagedChunk
+from sls.campaign.folder import COLLECT_JOB, CampaignFolder, DamagedChunk
 from sls.campaign.progress import Progress
 from sls.campaign.whole_files import write_whole
 from sls.input_error import InputError
@@ -383,7 +383,7 @@ def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None
     the campaign. Raises InputError, EngineError, ControllerLost."""
     from sls.campaign.collect import collect as collect_folder, describe_broken_measures
     try:
-        folder.take_lock()
+        folder.take_lock(COLLECT_JOB)
     except InputError as error:
         say(f"nothing to do: {error}")
         return
