@@ -35,6 +35,9 @@ USER = 1000
 # Of the 220 packages, these draw in most of what compiles and draws: three quarters of a gigabyte. The system gets empty
 # ones: what sls would need of them is missing, which is more than a user lacks.
 EMPTY = ("libgl1-mesa-dri", "python3-pythran", "python3-sympy", "unicode-data")
+# For commands in the system that use the network, of this machine without its compilers.
+ENVIRONMENT = {**{name: value for name, value in os.environ.items() if not name.startswith("CMAKE_")},
+               "PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive", "LC_ALL": "C"}
 # Files in which apt and dpkg record their own work, and temporary files.
 JOURNALS = re.compile(r"/(proc|sys|tmp|run|dev/shm|var/(cache|log|lib/(apt|dpkg)))(/|$)|/etc/ld\.so\.cache$|"
                       r"/var/lib/systemd/|/usr/share/man/.*index")
@@ -72,10 +75,8 @@ def run(command, expected=0, limit_s=600.0, **options):
 def run_apt(*command):
     """Runs a command in the system with the network of this machine, because apt needs the mirror."""
     script = f"mount -t proc proc '{SYSTEM}/proc'; exec chroot '{SYSTEM}' \"$@\""
-    environment = {**os.environ, "PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive",
-                   "LC_ALL": "C"}
     return run(["unshare", "--mount", "--propagation", "private", "sh", "-c", script, "sh", *command],
-               limit_s=1200, env=environment)
+               limit_s=1200, env=ENVIRONMENT)
 
 
 def make_package():
@@ -236,8 +237,7 @@ cp -r root/usr/share/doc/sls/examples/ci root/root/ci && mv root/tmp/sls.deb roo
 chroot root dpkg --purge sls
 exec chroot root sh -e -c "cd /root/ci
 $1" """
-        environment = {**os.environ, "PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive",
-                       "LC_ALL": "C", "SLS_DEB": "file:///srv/sls.deb"}
+        environment = {**ENVIRONMENT, "SLS_DEB": "file:///srv/sls.deb"}
         said = run(["unshare", "--mount", "--propagation", "private", "--pid", "--fork", "--kill-child", "sh", "-c",
                     script, "sh", lines], env=environment, limit_s=1200)
         self.assertIn("100% tests passed", said)
