@@ -84,6 +84,7 @@ void Server::linger(const ServerCore& core) {
   bus::wait_for_recorders_to_end(endpoints_.participants, core.run_id(), expected);
   endpoints_.records.wait_for_acknowledgments(1s);
   endpoints_.status.wait_for_acknowledgments(1s);
+  endpoints_.replies.wait_for_acknowledgments(1s);  // to the operator who stopped the run
 }
 
 void Server::fill(CommandSample& received, const Commands& sample,

@@ -35,13 +35,15 @@ TEST_F(ControlTest, ResetBeginsANewRunInASubfolderAndKeepsTheFirst) {
   const Answer refused = control({"resume"});
   EXPECT_EQ(refused.exit_code, 1);
   EXPECT_TRUE(holds(refused.output, "not paused")) << refused.output;
-  EXPECT_EQ(control({"reset"}).exit_code, 0);
+  const Answer reset = control({"reset"});
+  EXPECT_EQ(reset.exit_code, 0) << reset.output;
   ASSERT_TRUE(wait_until([&] {
     const auto status = read_status();
     return status.at("run_id") != first.at("run_id") && status.at("step").get<int>() > 50;
   })) << flight_.outputs();
   const auto second = read_status();
-  EXPECT_EQ(control({"stop"}).exit_code, 0);
+  const Answer stop = control({"stop"});
+  EXPECT_EQ(stop.exit_code, 0) << stop.output;
   flight_.wait();
   EXPECT_EQ(read_manifest(flight_.recording()).at("outcome"), "reset");
   EXPECT_EQ(read_manifest(flight_.recording()).at("run_id"), first.at("run_id"));
