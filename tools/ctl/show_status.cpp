@@ -23,8 +23,8 @@ constexpr auto kRedrawTime = 250ms;
 constexpr auto kLineTime = 1s;
 /// Discovery finds the participants of a run about as soon as their server, if no packet is lost.
 constexpr auto kDiscoveryTime = 400ms;
-constexpr auto kLongestDiscovery = 3s;
-constexpr auto kFreshTime = 1500ms;  // a healthy server publishes every 0.5 s
+constexpr double kLongestDiscovery = 3.0;  // s
+constexpr auto kFreshTime = 1500ms;        // a healthy server publishes every 0.5 s
 constexpr std::size_t kFileColumns = 160;
 
 void check_written(const std::ostream& out) {
@@ -36,13 +36,15 @@ bool is_interrupted() { return app::stop_signal() != 0; }
 /// Waits until the announcements of all participants have come.
 void wait_for_discovery(const OperatorClient& client) {
   const auto began = Clock::now();
-  while (!is_interrupted()) {
+  const app::Wait wait(kLongestDiscovery);
+  while (!is_interrupted() &&
+         (Clock::now() - began < kDiscoveryTime || !client.has_heard_everyone())) {
+    if (wait.is_over()) {
+      spdlog::warn("not every participant was heard within {} s: some may be missing below",
+                   kLongestDiscovery);
+      return;
+    }
     std::this_thread::sleep_for(app::kPollTime);
-    const auto passed = Clock::now() - began;
-    if (passed >= kDiscoveryTime && client.has_heard_everyone()) return;
-    if (passed < kLongestDiscovery) continue;
-    spdlog::warn("not every participant was heard within 3 s: some may be missing below");
-    return;
   }
 }
 
