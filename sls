@@ -207,4 +207,5 @@ case ${1:-} in
 esac
 [[ -x /usr/bin/python3 ]] || install_missing python3
 ((is_installing)) || set -- --no-install "$@"
-exec /usr/bin/python3 -BP "$root/python/sls/launcher/__main__.py" "$@"
+unset PYTHONHOME  # of another Python
+exec /usr/bin/python3 -BI "$root/python/sls/launcher/__main__.py" "$@"

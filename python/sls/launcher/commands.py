@@ -85,7 +85,11 @@ def set_up(words: list[str]) -> int:
 
 def build(words: list[str]) -> int:
     Parser("build", "", "Sets up and builds; the programs are in build/bin.").parse(words)
-    has_yaml = importlib.util.find_spec("yaml") is not None  # without it no man page can be made
+    try:
+        import yaml  # noqa: F401
+        has_yaml = True
+    except Exception:  # missing or broken: then no man page can be made
+        has_yaml = False
     build_programs(*PROGRAMS, "_sls_core", *(["man_pages"] if has_yaml else []))
     say(f"programs in build/bin: {' '.join(PROGRAMS)}; the module of the package sls in build/python"
         + (", the man pages in build/man" if has_yaml else ""))
