@@ -217,12 +217,13 @@ def network_table(words: list[str]) -> NoReturn:
 
 def test(words: list[str]) -> NoReturn:
     parser = Parser("test", "[--slow | --sanitize KIND] [--only REGEX]",
-                    "Sets up, builds and runs the tests. build/test.xml has the output of each.")
+                    "Sets up, builds and runs the tests, the unit suites with AddressSanitizer. build/test.xml\n"
+                    "has the output of each.")
     parser.add_argument("--slow", action="store_true",
                         help="also run the tests that take minutes; they need an idle machine")
     parser.add_argument("--sanitize", type=one_of("address", "thread"), metavar="KIND",
-                        help="run only the unit tests, built with a sanitizer: address; or thread, which runs those "
-                             "with several threads")
+                        help="address: run only the unit suites; thread: those with several threads, built with "
+                             "ThreadSanitizer")
     parser.add_argument("--only", type=filled("pattern"), metavar="REGEX",
                         help="run only the tests whose names match")
     options, _ = parser.parse(words)
@@ -234,9 +235,12 @@ def test(words: list[str]) -> NoReturn:
     elif not options.slow:
         which += ["--label-exclude", "slow"]
     call_script("@setup", "test_packages", "python_packages", "bench_packages", "doc_packages", "package_packages",
-                *(["fuzz_packages"] if preset == "asan" else []))
+                *([] if preset == "tsan" else ["fuzz_packages"]))
     call_script("@npm", ROOT / "tests/tools/view")
-    call_script("@tree", preset, folder, *{"asan": ["test_programs"], "tsan": ["threaded_tests"]}.get(preset, []))
+    if preset != "tsan":  # the unit suites, which run with those of `build`: tests/CMakeLists.txt
+        call_script("@tree", "asan", ROOT / "build-asan", "test_programs")
+    if preset != "asan":
+        call_script("@tree", preset, folder, *(["threaded_tests"] if preset == "tsan" else []))
     # The tests must not get variables that the middleware reads from the environment.
     hidden = [f"--unset={name}" for name in ("ROS_DISCOVERY_SERVER", "FASTRTPS_DEFAULT_PROFILES_FILE",
                                              "FASTDDS_DEFAULT_PROFILES_FILE", "SLS_DOMAIN")]
