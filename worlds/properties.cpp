@@ -109,7 +109,7 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id, const N
   const auto has_won = [&](const auto& item) {
     const auto& [id, other] = item;
     if (other.server == &server || other.server->process().was_killed()) return false;
-    // The last change may not be known.
+    // Others may not have heard of the last change.
     const auto progress = [&](const Run& run) {
       return run.has_status ? sync::calc_progress(run.phase) : 0;
     };
@@ -117,7 +117,7 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id, const N
       return run.has_status && timeline_.now() - run.phase_since < kHeardWithin;
     };
     if (has_changed(other)) return true;
-    // Without its goodbye it counts as present, in a phase it had, until its lease ends.
+    // If its goodbye is lost, others keep its last known phase until its lease expires.
     const bool is_end_unknown = network.has_missed_leave(server.id(), other.server->id());
     if (has_changed(own)) return is_end_unknown || !other.has_ended;
     const int others_progress = is_end_unknown ? other.furthest : progress(other);
