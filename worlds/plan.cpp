@@ -83,7 +83,7 @@ std::optional<std::size_t> find_program(const Plan& plan, const faults::Program&
   return std::nullopt;
 }
 
-/// Gives some clients a wrong word about themselves.
+/// Makes some clients announce something false about themselves.
 void draw_habits(PlannedProgram& client, Random& random) {
   client.has_library = random.chance(0.03);
   client.says_done = random.chance(0.02);
