@@ -53,9 +53,9 @@ struct Neighbourhood {
   }
 };
 
-/// Removes those whose reader of sls/state is not among `readers`, whom our writer knows, or whose
-/// writer of sls/command is not among `writers`, whom our reader knows: no state reaches them yet,
-/// or no answer us. A client says that it is ready when it sees the server, which may be earlier.
+/// Removes controllers that are not matched in both directions: our writer of sls/state knows the
+/// participants `readers`, our reader of sls/command the participants `writers`. A client announces
+/// that it is ready when it sees the server, which may be earlier.
 inline void keep_matched(std::vector<sync::Member>& controllers,
                          const std::set<bus::PeerId>& readers,
                          const std::set<bus::PeerId>& writers) {

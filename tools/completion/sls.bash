@@ -2,7 +2,7 @@
 # Generated from the help of ./sls and of the programs by ./sls reference; changes here are lost.
 # tests/docs/completion_test.py completes with it. shellcheck shell=bash
 
-_sls_commands="bench build campaign campaign-worker chaos check clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view worlds"
+_sls_commands="bench build campaign campaign-worker chaos check clean convert ctl delay-margin demo discovery-server docker-demo doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view worlds"
 declare -gA _sls_options=(
   ["bench"]="--help --quick --json --only --out"
   ["build"]="--help"
@@ -17,7 +17,6 @@ declare -gA _sls_options=(
   ["demo"]="--help --out --force --qos --domain --period-s --mode --rtf --in-process --view --view-port"
   ["discovery-server"]="--help --listen --port"
   ["docker-demo"]="--help --scenario --out --build"
-  ["docs"]="--help"
   ["doctor"]="--help --qos --domain --log-level --version --peer --identity --json --answer --for-s"
   ["fuzz"]="--help --seconds --target"
   ["help"]="--help"
@@ -49,7 +48,7 @@ declare -gA _sls_positionals=(
   ["convert"]="dir"
   ["delay-margin"]="scenario"
   ["demo"]="scenario"
-  ["help"]="bench build campaign campaign-worker chaos check clean convert ctl delay-margin demo discovery-server docker-demo docs doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view worlds"
+  ["help"]="bench build campaign campaign-worker chaos check clean convert ctl delay-margin demo discovery-server docker-demo doctor fuzz help keys list network-table package plot python reference report run setup study systems test verify view worlds"
   ["keys"]="dir"
   ["plot"]="dir"
   ["report"]="dir"

@@ -25,7 +25,7 @@ struct PlainAnnouncement {
   std::string version;                 ///< of its Fast DDS, if it is a program of ours; else empty
   std::string certificate, authority;  ///< subjects, if it is a program of ours; else empty
   bool is_secured = false;             ///< it announces an identity
-  bool is_leaving = false;             ///< it says no more than that it leaves
+  bool is_leaving = false;             ///< it only says that it leaves
   PeerId sender;
   /// Of Fast DDS before version 3 and of Cyclone DDS: the same message as if the secure writer had
   /// sent it. A reader that requires a protected one or has not authenticated the participant drops

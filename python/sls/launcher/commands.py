@@ -57,7 +57,6 @@ Development
   chaos                   stop, kill and restart processes of flights at random
   fuzz                    feed mutated input to readers of files and samples
   reference               write docs/reference and the bash completion
-  docs                    build API pages: build/docs/index.html
   package                 build a Debian package: build/package/
   systems [NAME…]         run the two commands in clean Debian systems
   setup | build | clean   install packages | build programs | remove them
@@ -73,7 +72,7 @@ exit codes: 0 done; 1 the run or a test failed; 2 bad usage or configuration;
 FOREIGN = ("view", "ctl", "verify", "convert", "plot", "report", "study", "campaign", "campaign-worker", "doctor",
            "bench", "worlds", "check", "network-table", "chaos", "reference", "systems")
 CONTROLS = ("pause", "step", "resume", "start", "reset", "stop", "status")
-SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "docs", "fuzz", "network-table",
+SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "fuzz", "network-table",
                    "package", "reference", "setup", "study", "systems", "test")
 
 
@@ -234,7 +233,7 @@ def test(words: list[str]) -> NoReturn:
         which += ["--label-regex", "threaded"]
     elif not options.slow:
         which += ["--label-exclude", "slow"]
-    call_script("@setup", "test_packages", "python_packages", "bench_packages", "doc_packages", "package_packages",
+    call_script("@setup", "test_packages", "python_packages", "bench_packages", "package_packages",
                 *([] if preset == "tsan" else ["fuzz_packages"]))
     call_script("@npm", ROOT / "tests/tools/view")
     if preset != "tsan":  # the unit suites, which run with those of `build`: tests/CMakeLists.txt
@@ -255,16 +254,6 @@ def reference(words: list[str]) -> NoReturn:
         call_script("@install", "python_packages")
         build_programs(*PROGRAMS, "_sls_core", "sls_scenario_keys", "network_table", "chaos")
     replace_by(PYTHON, "-B", ROOT / "tools/reference", "--build", BUILD, *words)
-
-
-def docs(words: list[str]) -> int:
-    Parser("docs", "", "Builds API pages of the C++ and C headers and of the Python package:\n"
-                       "build/docs/index.html.").parse(words)
-    call_script("@setup", "doc_packages", "python_packages")
-    build_programs("_sls_core")  # its docstrings are pages, too
-    building.run(ROOT / "docs/api/build.sh", BUILD)
-    say(f"pages: {BUILD}/docs/index.html")
-    return 0
 
 
 def systems(words: list[str]) -> NoReturn:
@@ -314,7 +303,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "verify": start("sls_verify"), "convert": start("sls_convert"), "python": python, "plot": plot, "report": report,
     "study": study, "check": check, "campaign": campaign, "campaign-worker": campaign_worker, "doctor": start("sls_doctor"),
     "keys": keys, "docker-demo": docker_demo, "discovery-server": discovery_server, "network-table": network_table,
-    "fuzz": fuzz, "chaos": start("chaos", "tests"), "test": test, "reference": reference, "docs": docs,
+    "fuzz": fuzz, "chaos": start("chaos", "tests"), "test": test, "reference": reference,
     "systems": systems, "package": package, "clean": clean, "help": show_help,
 }
 

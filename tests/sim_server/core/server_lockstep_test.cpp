@@ -60,7 +60,7 @@ TEST(ServerLockstepTest, WithoutAnAnswerTheStateIsSentAgainInDoublingIntervals) 
   EXPECT_EQ(rig.status().counters().resent(), 5u);
 }
 
-TEST(ServerLockstepTest, AfterARoundTripFourOfThemAreWaited) {
+TEST(ServerLockstepTest, ResendTimeoutIsFourRoundTrips) {
   ServerRig rig;
   rig.join("pilot");
   rig.wait_until(2);
@@ -296,7 +296,7 @@ TEST(ServerLockstepTest, PolicyHoldFliesTheLastForceAPeriodOfWallTimeEachThenThe
                    "force"}));
   rig.answer("pilot", 4);
   rig.wait_until(2000);
-  EXPECT_EQ(rig.step(), 5u) << "the deadline counts anew";
+  EXPECT_EQ(rig.step(), 5u) << "the deadline counts again";
   EXPECT_EQ(rig.status().timing().to_string(), "degraded: 2 steps held, 1 fail-safe");
 }
 
