@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <functional>
 
 #include "common/bus/topics.hpp"
 
@@ -16,19 +15,9 @@ using namespace std::chrono_literals;
 constexpr std::uint64_t kRun = 0xab;
 const std::string kScenario(64, 'a');
 
-/// Vehicles 0 and 1, rods of 1 m, steps of 10 ms: a stage of 2 s, then one of 3 s.
 config::Scenario make_scenario() {
   config::Scenario scenario;
   scenario.sha256 = kScenario;
-  scenario.sync.period_ns = 10'000'000;
-  scenario.vehicle.rod_length = 1.0;
-  scenario.vehicles.resize(2);
-  for (const std::int64_t seconds : {2, 3}) {
-    config::Stage stage;
-    stage.name = seconds == 2 ? "climb" : "stay";
-    stage.leave = config::LeaveAfter{seconds * 1'000'000'000};
-    scenario.mission.push_back(stage);
-  }
   return scenario;
 }
 
@@ -70,17 +59,15 @@ class ParticipantCheckTest : public testing::Test {
   }
   std::vector<std::string> only(const std::string& text) { return {text}; }
 
-  static OfferedAnswer make_answer(std::uint64_t step, std::uint32_t stage = 0) {
+  static OfferedAnswer make_answer(std::uint64_t step) {
     OfferedAnswer answer;
     answer.run_id = kRun;
     answer.step = step;
     answer.client_name = "foo";
-    answer.answer.memory.stage = stage;
     return answer;
   }
-  void take(const OfferedAnswer& answer, const model::ControllerMemory& returned = {},
-            Verdict verdict = Verdict::kAccepted) {
-    check_.answers().note_taken(answer, make_peer(1), verdict, returned, state_);
+  void take(const OfferedAnswer& answer, Verdict verdict = Verdict::kAccepted) {
+    check_.answers().note_taken(answer, make_peer(1), verdict);
   }
   void reject(const OfferedAnswer& answer, Verdict verdict, std::uint64_t step) {
     check_.answers().note_rejected(answer, make_peer(1), verdict, step);
@@ -89,7 +76,6 @@ class ParticipantCheckTest : public testing::Test {
   ParticipantCheck check_{kRun, make_scenario(), {0, 1}};
   Neighbourhood neighbourhood_;
   bool are_matched_ = true;  // the endpoints of every controller
-  model::Measurement state_;
 };
 
 const std::string kFoo = "controller 'foo' on box: ";
@@ -123,10 +109,10 @@ TEST_F(ParticipantCheckTest, AnUnknownRunIsReportedOnceItLasts) {
   entry.announcement.run_id(0xcd);
   neighbourhood_.participants = {entry};
   EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(1s).empty());
+  EXPECT_TRUE(look(3900ms).empty());
   const auto expected =
       only(kFoo + "sls/participant run_id: expected 00000000000000ab, got 00000000000000cd");
-  EXPECT_EQ(look(1400ms), expected);
+  EXPECT_EQ(look(4s), expected);
   EXPECT_EQ(look(9s), expected);
   neighbourhood_.participants = {make_entry(1)};
   EXPECT_TRUE(look(10s).empty());
@@ -138,12 +124,12 @@ TEST_F(ParticipantCheckTest, ARunOfZeroIsNamedOnceItLasts) {
   neighbourhood_.participants = {entry};
   EXPECT_TRUE(look().empty());
   const auto expected = only(kFoo + "sls/participant run_id: expected 00000000000000ab, got 0");
-  EXPECT_EQ(look(1s), expected);
-  neighbourhood_.participants[0].announcement.vehicle_ids({7});
-  EXPECT_TRUE(look(2s).empty()) << "it may wait for another server";
-  neighbourhood_.participants[0].announcement.vehicle_ids({});
-  look(3s);
   EXPECT_EQ(look(4s), expected);
+  neighbourhood_.participants[0].announcement.vehicle_ids({7});
+  EXPECT_TRUE(look(5s).empty()) << "it may wait for another server";
+  neighbourhood_.participants[0].announcement.vehicle_ids({});
+  look(6s);
+  EXPECT_EQ(look(10s), expected);
 }
 
 TEST_F(ParticipantCheckTest, AControllerOfAnotherServerIsNotOurs) {
@@ -168,11 +154,11 @@ TEST_F(ParticipantCheckTest, UnknownVehiclesAreReportedOnceTheyLast) {
   neighbourhood_.other_vehicles = {20};
   neighbourhood_.participants = {entry};
   EXPECT_TRUE(look().empty());
-  EXPECT_EQ(look(1s), only(kFoo + "sls/participant vehicle_ids: expected 0-1, got 7-8"));
+  EXPECT_EQ(look(4s), only(kFoo + "sls/participant vehicle_ids: expected 0-1, got 7-8"));
   entry.announcement.vehicle_ids({});
   neighbourhood_.participants = {entry};
-  look(2s);
-  EXPECT_EQ(look(3s), only(kFoo + "sls/participant vehicle_ids: expected 0-1, got none"));
+  look(5s);
+  EXPECT_EQ(look(9s), only(kFoo + "sls/participant vehicle_ids: expected 0-1, got none"));
 }
 
 TEST_F(ParticipantCheckTest, AnotherScenarioIsNamedWithBoth) {
@@ -181,21 +167,6 @@ TEST_F(ParticipantCheckTest, AnotherScenarioIsNamedWithBoth) {
   neighbourhood_.participants = {entry};
   EXPECT_EQ(look(), only(kFoo + "sls/participant scenario_sha256: expected " + kScenario +
                          ", got " + std::string(64, 'b')));
-}
-
-TEST_F(ParticipantCheckTest, OnANetworkARunIsAskedForOnceTheClientHasParametersAndStatus) {
-  auto entry = make_entry(1), earlier = make_entry(2);
-  entry.announcement.run_id(0);
-  earlier.announcement.run_id(0xcd);
-  neighbourhood_.is_on_network = true;
-  neighbourhood_.participants = {entry, earlier};
-  EXPECT_TRUE(look().empty());
-  neighbourhood_.informed = {make_peer(2)};
-  EXPECT_TRUE(look(5s).empty());
-  EXPECT_TRUE(look(7400ms).empty());
-  EXPECT_EQ(look(7500ms).size(), 1u);  // of the client that has them
-  EXPECT_EQ(look(14900ms).size(), 1u);
-  EXPECT_EQ(look(15s).size(), 2u);
 }
 
 TEST_F(ParticipantCheckTest, ARoleThatIsNotDefinedIsNamed) {
@@ -217,28 +188,28 @@ TEST_F(ParticipantCheckTest, AClientThatIsNeverReadyIsNamedWithItsEndpoints) {
   entry.announcement.ready(false);
   neighbourhood_.participants = {entry};
   EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(900ms).empty());
-  EXPECT_EQ(look(1s), only(kFoo + "sls/participant ready: expected true, as its endpoints are "
+  EXPECT_TRUE(look(3900ms).empty());
+  EXPECT_EQ(look(4s), only(kFoo + "sls/participant ready: expected true, as its endpoints are "
                                   "matched, got false"));
   neighbourhood_.participants[0].announcement.ready(true);
-  EXPECT_TRUE(look(2s).empty());
+  EXPECT_TRUE(look(5s).empty());
 }
 
 TEST_F(ParticipantCheckTest, AMissingEndpointIsNamed) {
   are_matched_ = false;
   neighbourhood_.participants = {make_entry(1)};
   look();
-  EXPECT_EQ(look(1s), only(kFoo + "expected a reader of sls/state and a writer of sls/command, got "
+  EXPECT_EQ(look(4s), only(kFoo + "expected a reader of sls/state and a writer of sls/command, got "
                                   "none"));
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
-  EXPECT_TRUE(look(2s).empty());
-  EXPECT_EQ(look(3s), only(kFoo + "expected a reader of sls/state, got none"));
+  EXPECT_TRUE(look(5s).empty());
+  EXPECT_EQ(look(9s), only(kFoo + "expected a reader of sls/state, got none"));
   neighbourhood_.command_writers.clear();
   neighbourhood_.state_readers = {make_peer(1)};
-  look(4s);
-  EXPECT_EQ(look(5s), only(kFoo + "expected a writer of sls/command, got none"));
+  look(10s);
+  EXPECT_EQ(look(14s), only(kFoo + "expected a writer of sls/command, got none"));
   neighbourhood_.explained = {make_peer(1)};  // its writer has other QoS: already reported
-  EXPECT_TRUE(look(6s).empty());
+  EXPECT_TRUE(look(15s).empty());
 }
 
 TEST_F(ParticipantCheckTest, EndpointsAreWaitedForLongerOnANetwork) {
@@ -248,18 +219,6 @@ TEST_F(ParticipantCheckTest, EndpointsAreWaitedForLongerOnANetwork) {
   look();
   EXPECT_TRUE(look(14900ms).empty());
   EXPECT_EQ(look(15s).size(), 1u);
-}
-
-TEST_F(ParticipantCheckTest, OnANetworkAClientThatIsNeverReadyIsNamedWithin3sOfItsNews) {
-  neighbourhood_.is_on_network = true;
-  neighbourhood_.participants = {make_entry(1)};
-  neighbourhood_.participants[0].announcement.ready(false);
-  look();
-  EXPECT_TRUE(look(3s).empty());  // it may not know the server's endpoints yet
-  neighbourhood_.informed = {make_peer(1)};
-  EXPECT_TRUE(look(4s).empty());
-  EXPECT_TRUE(look(6400ms).empty());
-  EXPECT_EQ(look(6500ms).size(), 1u);
 }
 
 TEST_F(ParticipantCheckTest, ANameThatIsNotUtf8IsNamed) {
@@ -273,73 +232,9 @@ TEST_F(ParticipantCheckTest, NamesAreShownPrintable) {
   entry.announcement.run_id(0);
   neighbourhood_.participants = {entry};
   look();
-  const auto found = look(1s);
+  const auto found = look(4s);
   ASSERT_EQ(found.size(), 1u);
   EXPECT_EQ(found[0].find_first_of("\n\x1b"), std::string::npos) << found[0];
-}
-
-TEST_F(ParticipantCheckTest, TwoClientsOfOneNameAndStrengthAreNamed) {
-  auto first = make_entry(1), second = make_entry(2);
-  second.announcement.host("desk");
-  second.announcement.vehicle_ids({1});
-  const auto later = sync::Time(1h + 500ms);
-  first.heard = later;
-  second.heard = second.ready_since = later - 400ms;
-  neighbourhood_.participants = {second, first};
-  EXPECT_EQ(look(600ms),
-            only("controller 'foo' on desk: sls/participant name and strength: expected others "
-                 "than those of controller 'foo' on box, got the same: which of the two flies is "
-                 "arbitrary"));
-  EXPECT_TRUE(look(3s).empty()) << "the first one is silent";
-
-  const auto expect_none = [&](const std::function<void(Participant&)>& change) {
-    auto other = second;
-    change(other.announcement);
-    neighbourhood_.participants = {first, other};
-    EXPECT_TRUE(look(600ms).empty());
-  };
-  expect_none([](Participant& other) { other.name("bar"); });
-  expect_none([](Participant& other) { other.strength(1); });
-  expect_none([](Participant& other) {
-    other.vehicle_ids({2});
-    other.run_id(0xcd);
-  });
-  expect_none([](Participant& other) { other.ready(false); });
-  expect_none([](Participant& other) { other.done(true); });
-  first.announcement.vehicle_ids({0});
-  expect_none([](Participant&) {});  // the other one flies vehicle 1
-  first.announcement.vehicle_ids({0, 1});
-  first.announcement.ready(false);
-  expect_none([](Participant&) {});
-  first.announcement.ready(true);
-  second.announcement.contract_sha256("");
-  neighbourhood_.participants = {first, second};
-  const auto found = look(600ms);
-  ASSERT_EQ(found.size(), 1u);
-  EXPECT_NE(found[0].find("contract_sha256"), std::string::npos) << "it cannot fly anyway";
-}
-
-/// It stays listed until its lease ends.
-TEST_F(ParticipantCheckTest, AClientThatReplacesAKilledOneOfTheSameNameIsNoMistake) {
-  auto killed = make_entry(1), next = make_entry(2);
-  killed.heard = sync::Time(1h);
-  next.heard = next.ready_since = killed.heard + 100ms;
-  neighbourhood_.participants = {killed, next};
-  for (const auto time : {100ms, 600ms, 1100ms, 5000ms}) EXPECT_TRUE(look(time).empty());
-}
-
-/// They may announce themselves only once.
-TEST_F(ParticipantCheckTest, TwoClientsOfOneNameThatAnswerTheSameStepAreNamed) {
-  auto first = make_entry(1), second = make_entry(2);
-  second.ready_since = first.ready_since + 1h;
-  neighbourhood_.participants = {first, second};
-  EXPECT_TRUE(look().empty());
-  check_.answers().note_superseded(make_peer(1), make_peer(2));
-  EXPECT_EQ(look(100ms).size(), 1u);
-  EXPECT_EQ(look(2s).size(), 1u);
-  EXPECT_TRUE(look(2200ms).empty());
-  check_.answers().note_superseded(make_peer(2), make_peer(1));
-  EXPECT_EQ(look(3s).size(), 1u) << "whichever of them was first";
 }
 
 // --- strangers -----------------------------------------------------------------------------------
@@ -347,34 +242,18 @@ TEST_F(ParticipantCheckTest, TwoClientsOfOneNameThatAnswerTheSameStepAreNamed) {
 TEST_F(ParticipantCheckTest, AWriterOfCommandsWithoutAnAnnouncementIsNamedOnceThatLasts) {
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
   EXPECT_TRUE(look().empty());
-  EXPECT_EQ(check_.next_due(), sync::Time(1h + 1s));
-  EXPECT_TRUE(look(900ms).empty());
-  EXPECT_EQ(look(1s), only("'foo' (10.0.0.2): writes sls/command: expected an announcement in "
+  EXPECT_EQ(check_.next_due(), sync::Time(1h + 4s));
+  EXPECT_TRUE(look(3900ms).empty());
+  EXPECT_EQ(look(4s), only("'foo' (10.0.0.2): writes sls/command: expected an announcement in "
                            "sls/participant, got none"));
   neighbourhood_.explained = {make_peer(1)};  // its announcement does not fit: already reported
-  EXPECT_TRUE(look(2s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AnAnnouncementIsWaitedForUntilTheClientHasParametersAndStatus) {
-  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
-  neighbourhood_.announcement_writers = {make_peer(1)};
-  EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(3900ms).empty());  // a busy machine may have lost them
-  EXPECT_EQ(look(4s).size(), 1u);
-  neighbourhood_.informed = {make_peer(1)};
   EXPECT_TRUE(look(5s).empty());
-  EXPECT_TRUE(look(5900ms).empty());
-  EXPECT_EQ(look(6s).size(), 1u);
 }
 
 TEST_F(ParticipantCheckTest, AnAnnouncementIsWaitedForLongerOnANetwork) {
   neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
   neighbourhood_.is_on_network = true;
   EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(3900ms).empty());
-  EXPECT_EQ(look(4s).size(), 1u);  // it has no writer for announcements
-  neighbourhood_.announcement_writers = {make_peer(1)};
-  EXPECT_TRUE(look(5s).empty());
   EXPECT_TRUE(look(14900ms).empty());  // time for several losses in a row
   EXPECT_EQ(look(15s).size(), 1u);
   neighbourhood_.participants = {make_entry(1, "foo")};
@@ -391,13 +270,13 @@ TEST_F(ParticipantCheckTest, AMissingDeadlineExplainsThatNoWriterMatches) {
 TEST_F(ParticipantCheckTest, AMissingDeadlineIsReportedOnlyOfOurControllers) {
   neighbourhood_.missing_deadlines[make_peer(1)] = "sls/command of 'foo': DEADLINE";
   EXPECT_TRUE(look().empty());  // without an announcement its vehicles are unknown
-  EXPECT_EQ(look(1s), only("sls/command of 'foo': DEADLINE"));
+  EXPECT_EQ(look(4s), only("sls/command of 'foo': DEADLINE"));
   neighbourhood_.missing_deadlines = {{make_peer(2), "sls/command of 'bar': DEADLINE"}};
   neighbourhood_.participants = {make_entry(2, "bar")};
-  EXPECT_EQ(look(2s), only("sls/command of 'bar': DEADLINE"));
+  EXPECT_EQ(look(5s), only("sls/command of 'bar': DEADLINE"));
   neighbourhood_.participants[0].announcement.run_id(0xcd);  // of the run before, perhaps
-  EXPECT_TRUE(look(3s).empty());
-  const auto found = look(4s);
+  EXPECT_TRUE(look(6s).empty());
+  const auto found = look(10s);
   EXPECT_NE(std::find(found.begin(), found.end(), "sls/command of 'bar': DEADLINE"), found.end());
 }
 
@@ -467,9 +346,9 @@ TEST_F(ParticipantCheckTest, AnswersThatAreAllRejectedAreNamedWithCauseAndCount)
   EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)),
             " (3 of its answers rejected, none taken: " + cause + ")");
   EXPECT_TRUE(look().empty());
-  EXPECT_EQ(look(800ms), only(kFoo + "sls/command: 3 answers rejected, none taken: " + cause));
+  EXPECT_EQ(look(4s), only(kFoo + "sls/command: 3 answers rejected, none taken: " + cause));
   take(make_answer(5));
-  EXPECT_TRUE(look(900ms).empty());
+  EXPECT_TRUE(look(4100ms).empty());
   EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)), "");
 }
 
@@ -491,9 +370,9 @@ TEST_F(ParticipantCheckTest, AFewAnswersToOldStepsAreNoMistake) {
   reject(make_answer(3), Verdict::kWrongStep, 500);
   reject(make_answer(4), Verdict::kWrongStep, 500);
   look();
-  EXPECT_TRUE(look(1s).empty());
+  EXPECT_TRUE(look(5s).empty());
   reject(make_answer(5), Verdict::kWrongStep, 500);
-  EXPECT_EQ(look(2s), only(kFoo + "sls/command: 3 answers rejected, none taken: step: expected "
+  EXPECT_EQ(look(6s), only(kFoo + "sls/command: 3 answers rejected, none taken: step: expected "
                                   "500, got 5"));
 }
 
@@ -557,16 +436,16 @@ TEST_F(ParticipantCheckTest, AClientThatIsDoneAndStillAnswersIsNamed) {
   take(make_answer(0));
   EXPECT_TRUE(look().empty());  // it may have been sent before
   EXPECT_TRUE(look(500ms).empty());
-  for (std::uint64_t step = 1; step < 10; ++step) {
+  for (std::uint64_t step = 1; step < 25; ++step) {
     take(make_answer(step));
     const auto found = look(500ms + step * 200ms);
-    if (step < 6)
+    if (step < 21)
       EXPECT_TRUE(found.empty()) << step;
     else
       EXPECT_EQ(found, only(kFoo + "sls/participant done: expected false, as it still answers, got "
                                    "true"));
   }
-  EXPECT_TRUE(look(5s).empty());
+  EXPECT_TRUE(look(9s).empty());
 }
 
 TEST_F(ParticipantCheckTest, AFloodOfCopiesIsNamed) {
@@ -574,18 +453,18 @@ TEST_F(ParticipantCheckTest, AFloodOfCopiesIsNamed) {
   const auto answer_steps = [&](int copies) {
     for (std::uint64_t step = 0; step < 10; ++step) {
       take(make_answer(step));
-      for (int i = 0; i < copies; ++i) take(make_answer(step), {}, Verdict::kDuplicate);
+      for (int i = 0; i < copies; ++i) take(make_answer(step), Verdict::kDuplicate);
     }
   };
   for (int i = 0; i < 20; ++i) {  // of states that were sent again
     answer_steps(20);
     EXPECT_TRUE(look(i * 100ms).empty());
   }
-  for (int i = 0; i <= 10; ++i) {
+  for (int i = 0; i <= 40; ++i) {
     answer_steps(99);
     EXPECT_EQ(
         look(2s + i * 100ms),
-        i < 10 ? std::vector<std::string>()
+        i < 40 ? std::vector<std::string>()
                : only(kFoo + "sls/command: expected one answer to each state, got over 30 copies "
                              "of each"));
   }
@@ -624,87 +503,6 @@ TEST_F(ParticipantCheckTest, AStageNameThatIsNotUtf8IsNamed) {
   answer.answer.stage_name = "h\xc3\xb6he";
   take(answer);
   EXPECT_TRUE(look(7s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AStageThatIsNotReturnedIsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  model::ControllerMemory returned;
-  returned.stage = 1;
-  take(make_answer(300, 0), returned, Verdict::kHeld);
-  EXPECT_EQ(look(), only(kFoo + "sls/command controller.stage_index at step 300: expected at least "
-                                "1, as in the state, got 0"));
-}
-
-TEST_F(ParticipantCheckTest, AStageThatIsNotReturnedExplainsThatTheMissionStaysInIt) {
-  neighbourhood_.participants = {make_entry(1)};
-  model::ControllerMemory returned;
-  returned.stage = 1;
-  for (std::uint64_t step = 0; step <= 301; ++step) take(make_answer(step), returned);
-  EXPECT_EQ(look(), only(kFoo + "sls/command controller.stage_index at step 0: expected at least "
-                                "1, as in the state, got 0"));
-}
-
-TEST_F(ParticipantCheckTest, NumbersThatAreNotReturnedAreNamedAsLongAsTheyAreMissing) {
-  neighbourhood_.participants = {make_entry(1)};
-  OfferedAnswer answer = make_answer(0);
-  answer.answer.memory.numbers = Eigen::Vector2d(1.0, 2.0);
-  take(answer);
-  EXPECT_TRUE(look().empty());
-  for (int i = 1; i < 10; ++i) {
-    take(make_answer(static_cast<std::uint64_t>(i)));
-    EXPECT_EQ(look(i * 1s), only(kFoo + "sls/command controller.numbers at step 1: expected 2 of "
-                                        "them, as before, got 0"));
-  }
-}
-
-TEST_F(ParticipantCheckTest, AMissionThatStaysInAStageThatIsOverIsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  for (std::uint64_t step = 0; step <= 300; ++step) take(make_answer(step));
-  EXPECT_TRUE(look().empty());  // the tolerance of a second
-  take(make_answer(301));
-  EXPECT_EQ(look(), only(kFoo + "sls/command controller.stage_index at step 301: expected more "
-                                "than 0 (stage 'climb' was over at 2 s), got 0 and mission "
-                                "running"));
-  take(make_answer(302, 1));
-  EXPECT_TRUE(look(3s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AMissionThatAdvancesIsFine) {
-  neighbourhood_.participants = {make_entry(1)};
-  for (std::uint64_t step = 0; step < 500; ++step) take(make_answer(step, step < 200 ? 0 : 1));
-  OfferedAnswer last = make_answer(500, 2);
-  last.answer.mission = model::MissionPhase::kFinished;
-  for (int i = 0; i < 500; ++i, ++last.step) take(last);  // other vehicles of the fleet still fly
-  EXPECT_TRUE(look().empty());
-}
-
-TEST_F(ParticipantCheckTest, AMissionThatNeverFinishesIsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  for (std::uint64_t step = 0; step <= 601; ++step)
-    take(make_answer(step, step < 200 ? 0 : step < 500 ? 1 : 2));
-  EXPECT_EQ(look(), only(kFoo + "sls/command mission at step 601: expected finished after the last "
-                                "stage, which was over at 5 s, got running"));
-}
-
-TEST_F(ParticipantCheckTest, AVehicleFarFromItsReferenceIsAnnouncedOnce) {
-  state_.p_WL = {50.0, 0.0, 0.0};
-  take(make_answer(8));
-  EXPECT_TRUE(check_.answers().take_events().empty());
-  state_.p_WL = {0.0, 51.0, 0.0};
-  take(make_answer(9));
-  take(make_answer(10));
-  EXPECT_EQ(check_.answers().take_events(),
-            only("step 9: vehicle 0: load 51 m from its reference, expected at most 50 rod lengths "
-                 "(50 m)"));
-  EXPECT_TRUE(check_.answers().take_events().empty());
-  OfferedAnswer other = make_answer(11);
-  other.vehicle_id = 1;
-  state_.p_WL.setZero();
-  state_.p_WQ = {0.0, 0.0, -60.0};
-  take(other);
-  EXPECT_EQ(check_.answers().take_events(),
-            only("step 11: vehicle 1: quadrotor 60 m from its reference, expected at most 50 rod "
-                 "lengths (50 m)"));
 }
 
 TEST_F(ParticipantCheckTest, UnknownParticipantsCannotFillTheMemory) {
