@@ -59,7 +59,7 @@ declare -gA _sls_positionals=(
 )
 declare -gA _sls_arguments=(
   ["bench --json"]="file"
-  ["bench --only"]="lockstep load round-trip realtime plant recorder campaign fleet qos start instructions view page"
+  ["bench --only"]="lockstep load realtime plant start instructions"
   ["bench --out"]="dir"
   ["campaign --chunk-runs"]="any"
   ["campaign --domain"]="any"

@@ -120,9 +120,7 @@ def bench(words: list[str]) -> NoReturn:
     if not is_help_asked(words):
         if not IS_BUILT_ELSEWHERE:
             call_script("@setup", "bench_packages")
-            call_script("@npm", ROOT / "tests/tools/view")
-        build_programs(*FLYING, "sim_ctl", "sls_view", "sls_bench_probe", "sls_bench_spinning_probe",
-                       "sls_microbench", "slow_clock", "view_foxglove_publisher")
+        build_programs(*FLYING, "sls_bench_probe", "sls_microbench", "slow_clock")
     replace_by_module("bench", "--build", BUILD, *words, paths=[str(ROOT)])
 
 
