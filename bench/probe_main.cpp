@@ -114,13 +114,12 @@ std::vector<Stamp> listen_to_states(const app::CommonOptions& options) {
   std::vector<Stamp> stamps;
   Clock::time_point last;
   {
-    bus::Reader<States> states(node, bus::kLoopReaderProfile,
-                               [&](const States& sample, const bus::PeerId&) {
-                                 const std::lock_guard lock(mutex);
-                                 stamps.push_back(
-                                     {sample.step(), states.written().time_since_epoch()});
-                                 last = Clock::now();
-                               });
+    bus::Reader<States> states(
+        node, bus::kLoopReaderProfile, [&](const States& sample, const bus::PeerId&) {
+          const std::lock_guard lock(mutex);
+          stamps.push_back({sample.step(), states.written().time_since_epoch()});
+          last = Clock::now();
+        });
     const app::Wait wait(kFirstSampleLimit_s);
     for (bool is_over = false; !is_over && app::stop_signal() == 0;) {
       std::this_thread::sleep_for(10ms);
