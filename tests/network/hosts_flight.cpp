@@ -6,9 +6,7 @@
 
 namespace sls::test {
 
-Profile::Profile(const Network& network, const std::string& name,
-                 const std::vector<std::string>& key_options)
-    : network_(network) {
+Profile::Profile(const Network& network, const std::string& name) : network_(network) {
   if (name == "unicast" || name == "wifi" || name == "secure") {
     std::string peers;
     for (const char* host : {"server", "controller", "recorder"})
@@ -24,9 +22,7 @@ Profile::Profile(const Network& network, const std::string& name,
     discovery_server_ = std::make_unique<Process>(command);
   } else if (name == "secure") {
     const std::string keys = folder_ / "keys";
-    Process maker(
-        std::vector<std::string>{std::string(SLS_SOURCE_DIR) + "/config/security/keys.sh", keys} +
-        key_options);
+    Process maker({std::string(SLS_SOURCE_DIR) + "/config/security/keys.sh", keys});
     if (maker.wait() != 0) throw std::runtime_error("keys.sh: " + maker.output());
     environment_.push_back("SLS_KEYS=" + keys);
   }

@@ -8,10 +8,11 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from sls import __version__
-from sls.launcher import building, flights
+from sls.launcher import building, completion, flights
 from sls.launcher.arguments import POSITIVE, Parser, filled, make_unknown_option, one_of, whole
 from sls.launcher.building import (FLYING, PROGRAMS, PYTHON, build_programs, call_script, is_help_asked, replace_by,
                                    replace_by_module, replace_by_program)
+from sls.launcher.completion import CONTROLS, FLOWN
 from sls.launcher.docker_demo import docker_demo
 from sls.launcher.fuzzing import fuzz
 from sls.launcher.listing import print_list
@@ -56,7 +57,7 @@ Development
   bench                   measure speed, each figure beside its bound
   chaos                   stop, kill and restart processes of flights at random
   fuzz                    feed mutated input to readers of files and samples
-  reference               write docs/reference and the bash completion
+  reference               write docs/reference
   package                 build a Debian package: build/package/
   systems [NAME…]         run the two commands in clean Debian systems
   setup | build | clean   install packages | build programs | remove them
@@ -71,7 +72,6 @@ exit codes: 0 done; 1 the run or a test failed; 2 bad usage or configuration;
 # Commands whose options a program or another Python module reads.
 FOREIGN = ("view", "ctl", "verify", "convert", "plot", "report", "study", "campaign", "campaign-worker", "doctor",
            "bench", "worlds", "check", "network-table", "chaos", "reference", "systems")
-CONTROLS = ("pause", "step", "resume", "start", "reset", "stop", "status")
 SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "fuzz", "network-table",
                    "package", "reference", "setup", "study", "systems", "test")
 
@@ -123,9 +123,7 @@ def bench(words: list[str]) -> NoReturn:
     if not is_help_asked(words):
         if not IS_BUILT_ELSEWHERE:
             call_script("@setup", "bench_packages")
-            call_script("@npm", ROOT / "tests/tools/view")
-        build_programs(*FLYING, "sim_ctl", "sls_view", "sls_bench_probe", "sls_bench_spinning_probe",
-                       "sls_microbench", "slow_clock", "view_foxglove_publisher")
+        build_programs(*FLYING, "sls_bench_probe", "sls_microbench", "slow_clock")
     replace_by_module("bench", "--build", BUILD, *words, paths=[str(ROOT)])
 
 
@@ -165,7 +163,7 @@ def study(words: list[str]) -> NoReturn:
 
 
 def campaign(words: list[str]) -> NoReturn:
-    targets = [] if words[:1] in (["status"], ["report"], ["compare"]) else ["_sls_core"]
+    targets = [] if words[:1] and words[0] in FLOWN else ["_sls_core"]
     if any(word.startswith("--verify") for word in words):
         targets += [*FLYING, "sls_verify"]
     run_module(words, targets, "sls.campaign", SLS_BUILD=str(BUILD))  # flights over DDS must not build
@@ -313,12 +311,11 @@ def check_words(command: str, words: list[str]) -> None:
 
     Commands without a table, and an installed launcher, which builds nothing, leave it to the program; so does `check`,
     which writes a JUnit file for these mistakes, too."""
-    file = ROOT / "tools/completion/sls.bash"
-    if command not in FOREIGN or command == "check" or is_help_asked(words) or not file.is_file():
+    if command not in FOREIGN or command == "check" or is_help_asked(words) or IS_INSTALLED:
         return
-    rows = re.findall(r'^  \["([\w -]+)"\]="(.*)"$', file.read_text(encoding="utf-8"), re.MULTILINE)
-    table = dict(reversed(rows))  # of several rows of a command the first has its options
-    known, others, takes_value = table.get(command, "").split(), [], False
+    known, others, takes_value = completion.read_options(command), [], False
+    if not known:
+        return
     for word in words:
         if word == "--":
             break
@@ -330,7 +327,7 @@ def check_words(command: str, words: list[str]) -> None:
         elif not any(option.startswith(name) for option in known):
             raise make_unknown_option(command, word, known)
         else:
-            takes_value = f"{command} {word}" in table
+            takes_value = bool(known.get(word, ("",))[0])
     if command == "ctl" and others and others[0] not in CONTROLS:
         raise Failure(f"ctl: expected {list_choices(CONTROLS)}, got '{others[0]}'{suggest(others[0], CONTROLS)}", 2)
     if command == "campaign" and len(others) == 1:
@@ -354,6 +351,10 @@ def main(words: list[str]) -> int:
     if command != "python" and "--no-install" in words:  # the options of python are the script's
         building.is_installing = False
         words = [word for word in words if word != "--no-install"]
+    if command == "@complete" and words:
+        kind, names = completion.complete(words, COMMANDS)
+        print(kind, *names, sep="\n")
+        return 0
     if command == "--version":
         print(f"sls {__version__}")
         return 0

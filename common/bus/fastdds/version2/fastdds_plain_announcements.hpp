@@ -5,7 +5,7 @@
 #include <functional>
 #include <string>
 
-#include "common/bus/fastdds/older_peers.hpp"
+#include "common/bus/fastdds/plain_announcements.hpp"
 
 namespace sls::bus {
 

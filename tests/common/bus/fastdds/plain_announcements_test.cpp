@@ -1,4 +1,4 @@
-#include "common/bus/fastdds/older_peers.hpp"
+#include "common/bus/fastdds/plain_announcements.hpp"
 
 #include <gtest/gtest.h>
 
@@ -35,13 +35,14 @@ Bytes parameter(std::uint16_t id, const Bytes& value) {
 
 const Bytes kVersion = parameter(0x0059, word(1) + text("sls.fastdds") + text("2.9.1"));
 const Bytes kName = parameter(0x0062, text("control_client"));
-const Bytes kProductVersion = parameter(0x8000, {3, 1, 2, 0});
 const Bytes kPlainIds = {0, 1, 0, 0xc7, 0, 1, 0, 0xc2};
 const Bytes kSecureIds = {0xff, 1, 1, 0xc7, 0xff, 1, 1, 0xc2};
 
+constexpr std::uint8_t kByFastDds = 15, kByCyclone = 16;  // vendors
+
 /// By the RTPS specification 2.3, 8.3.7 and 9.4: a header, a time, and an announcement.
 Bytes make_message(const Bytes& parameters, std::uint8_t number = 1, const Bytes& ids = kPlainIds,
-                   std::uint8_t vendor = 15) {
+                   std::uint8_t vendor = kByFastDds) {
   const Bytes header = {'R', 'T', 'P', 'S', 2, 3, 1, vendor, 1,  15,
                         3,   4,   5,   6,   7, 8, 9, 10,     11, 12};
   const Bytes time = Bytes{0x09, 1, 8, 0} + word(7) + word(8);
@@ -54,52 +55,45 @@ std::optional<PlainAnnouncement> find(const Bytes& message) {
   return find_announcement(message.data(), message.size());
 }
 
-TEST(OlderPeersTest, AnAnnouncementIsRepeatedWithTheIdsOfTheSecureWriter) {
-  const auto found = find(make_message(kVersion + kName));
+TEST(PlainAnnouncementsTest, AnAnnouncementOfCycloneIsRepeatedWithTheIdsOfTheSecureWriter) {
+  const auto found = find(make_message(kName, 1, kPlainIds, kByCyclone));
   ASSERT_TRUE(found);
   EXPECT_EQ(found->name, "control_client");
-  EXPECT_EQ(found->version, "2.9.1");
+  EXPECT_FALSE(found->is_secured);
   EXPECT_EQ(found->sender, (PeerId{{1, 15, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12}}));
-  EXPECT_EQ(found->as_secure, make_message(kVersion + kName, 1, kSecureIds));
+  EXPECT_EQ(found->as_secure, make_message(kName, 1, kSecureIds, kByCyclone));
 }
 
-TEST(OlderPeersTest, ALaterAnnouncementSaysThatThoseBeforeDoNotExist) {
-  const auto found = find(make_message(kName, 3));
+TEST(PlainAnnouncementsTest, ALaterAnnouncementSaysThatThoseBeforeDoNotExist) {
+  const auto found = find(make_message(kName, 3, kPlainIds, kByCyclone));
   ASSERT_TRUE(found);
-  const Bytes expected = make_message(kName, 3, kSecureIds);
+  const Bytes expected = make_message(kName, 3, kSecureIds, kByCyclone);
   const Bytes gap =
       Bytes{0x08, 1, 28, 0} + kSecureIds + word(0) + word(1) + word(0) + word(3) + word(0);
   EXPECT_EQ(found->as_secure, Bytes(expected.begin(), expected.begin() + 20) + gap +
                                   Bytes(expected.begin() + 20, expected.end()));
 }
 
-TEST(OlderPeersTest, AnnouncementsOfCycloneAreRepeated) {
-  const auto found = find(make_message(kName, 1, kPlainIds, 16));
-  ASSERT_TRUE(found);
-  EXPECT_EQ(found->name, "control_client");
-  EXPECT_FALSE(found->is_secured);
-  EXPECT_EQ(found->as_secure, make_message(kName, 1, kSecureIds, 16));
-}
-
-TEST(OlderPeersTest, AnnouncementsOfOthersAreNotRepeated) {
+TEST(PlainAnnouncementsTest, AnnouncementsOfOthersAreNotRepeated) {
   const Bytes token = parameter(0x1001, word(0));
-  const auto of_3 = find(make_message(kName + kProductVersion + token));
-  ASSERT_TRUE(of_3);
-  EXPECT_EQ(of_3->name, "control_client");
-  EXPECT_TRUE(of_3->is_secured);
-  EXPECT_EQ(of_3->as_secure, Bytes());
+  const auto of_fastdds = find(make_message(kVersion + kName + token));
+  ASSERT_TRUE(of_fastdds);
+  EXPECT_EQ(of_fastdds->name, "control_client");
+  EXPECT_EQ(of_fastdds->version, "2.9.1");
+  EXPECT_TRUE(of_fastdds->is_secured);
+  EXPECT_EQ(of_fastdds->as_secure, Bytes());
   const auto of_another_vendor = find(make_message(kName, 1, kPlainIds, 17));
   ASSERT_TRUE(of_another_vendor);
   EXPECT_EQ(of_another_vendor->as_secure, Bytes());
 }
 
-TEST(OlderPeersTest, OtherMessagesContainNone) {
+TEST(PlainAnnouncementsTest, OtherMessagesContainNone) {
   EXPECT_FALSE(find(make_message(kName, 1, {0, 0, 0, 0, 0, 0, 1, 3})));  // samples of a topic
   EXPECT_FALSE(find({}));
 }
 
-TEST(OlderPeersTest, MessagesOfAnyLengthAreReadWithinTheirBounds) {
-  const Bytes whole = make_message(kVersion + kName);
+TEST(PlainAnnouncementsTest, MessagesOfAnyLengthAreReadWithinTheirBounds) {
+  const Bytes whole = make_message(kVersion + kName, 3, kPlainIds, kByCyclone);
   for (std::size_t size = 0; size < whole.size(); ++size)
     EXPECT_FALSE(find(Bytes(whole.begin(), whole.begin() + static_cast<long>(size)))) << size;
   for (std::size_t at = 0; at < whole.size(); ++at)
@@ -110,7 +104,7 @@ TEST(OlderPeersTest, MessagesOfAnyLengthAreReadWithinTheirBounds) {
     }
 }
 
-TEST(OlderPeersTest, VersionsSince2_13HaveTheSecureWriter) {
+TEST(PlainAnnouncementsTest, VersionsSince2_13HaveTheSecureWriter) {
   for (const char* version : {"2.13.0", "2.14.3", "3.1.2"})
     EXPECT_TRUE(has_secure_announcements(version)) << version;
   for (const char* version : {"2.9.1", "2.11.2", "", "x"})

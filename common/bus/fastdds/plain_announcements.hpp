@@ -15,11 +15,11 @@ namespace sls::bus {
 /// Fast DDS 2.13 and later, 3 among them, discovers a secured participant only through a second
 /// announcement, sent by a secure writer after the authentication (PDPSimple::assignRemoteEndpoints
 /// of 3.1.2). So it does not tell the name of one that it refuses. Earlier versions announce that
-/// writer (PDP.cpp of 2.9.1, line 255), but do not have it; Cyclone DDS 0.10 has it, but writes
-/// nothing with it. So both sides wait for ever (README.md, trap 38).
+/// writer (PDP.cpp of 2.9.1, line 255), but do not have it: a secured flight needs one version.
+/// Cyclone DDS 0.10 has it, but writes nothing with it (README.md, trap 38).
 ///
-/// Upstream: none reported. `as_secure` is to be deleted with the support of versions before 2.13
-/// and of Cyclone DDS, the rest with refusals.hpp.
+/// Upstream: none reported. `as_secure` is to be deleted with the support of Cyclone DDS, the rest
+/// with refusals.hpp.
 struct PlainAnnouncement {
   std::string name;                    ///< of the participant; it chooses it
   std::string version;                 ///< of its Fast DDS, if it is a program of ours; else empty
@@ -27,9 +27,8 @@ struct PlainAnnouncement {
   bool is_secured = false;             ///< it announces an identity
   bool is_leaving = false;             ///< it only says that it leaves
   PeerId sender;
-  /// Of Fast DDS before version 3 and of Cyclone DDS: the same message as if the secure writer had
-  /// sent it. A reader that requires a protected one or has not authenticated the participant drops
-  /// it.
+  /// Of Cyclone DDS: the same message as if the secure writer had sent it. A reader that requires a
+  /// protected one or has not authenticated the participant drops it.
   std::vector<std::uint8_t> as_secure;
 };
 

@@ -1,4 +1,4 @@
-#include "common/bus/fastdds/older_peers.hpp"
+#include "common/bus/fastdds/plain_announcements.hpp"
 
 #include <algorithm>
 #include <array>
@@ -15,7 +15,7 @@ constexpr std::array<std::uint8_t, 4> kSecureReader = {0xff, 1, 1, 0xc7};
 constexpr std::uint8_t kData = 0x15, kGap = 0x08;
 constexpr std::uint8_t kLittleEndian = 1, kInlineQos = 2, kSample = 4;
 constexpr std::uint16_t kSentinel = 0x0001, kProperties = 0x0059, kEntityName = 0x0062,
-                        kIdentityToken = 0x1001, kProductVersion = 0x8000;
+                        kIdentityToken = 0x1001;
 
 /// A part of a message. The bytes beyond its end read as zeros and end it.
 class Bytes {
@@ -89,7 +89,6 @@ std::vector<std::uint8_t> make_gap(std::uint32_t high, std::uint32_t low) {
 std::optional<PlainAnnouncement> find_announcement(const std::uint8_t* message, std::size_t size) {
   constexpr std::array<std::uint8_t, 4> kMagic = {'R', 'T', 'P', 'S'};
   if (size < kHeader || !std::equal(kMagic.begin(), kMagic.end(), message)) return {};
-  const bool is_of_fastdds = message[6] == 1 && message[7] == 15;
   const bool is_of_cyclone = message[6] == 1 && message[7] == 16;
   Bytes rest(message, size, true);
   rest.skip(kHeader);
@@ -114,14 +113,12 @@ std::optional<PlainAnnouncement> find_announcement(const std::uint8_t* message, 
       return {};
 
     PlainAnnouncement found;
-    bool is_new = false;
     if ((flags & kInlineQos) && !read_parameters(sample, [](auto...) {})) return {};
     if (flags & kSample) {
       const bool is_little = sample.left() > 1 && (sample.at()[1] & 1) != 0;
       Bytes list(sample.at(), sample.left(), is_little);
       list.skip(4);
       const bool is_whole = read_parameters(list, [&](std::uint16_t id, Bytes value) {
-        if (id == kProductVersion) is_new = true;
         if (id == kIdentityToken) found.is_secured = true;
         if (id == kEntityName) found.name = value.read_string();
         if (id != kProperties) return;
@@ -136,8 +133,7 @@ std::optional<PlainAnnouncement> find_announcement(const std::uint8_t* message, 
     }
     found.is_leaving = (flags & kSample) == 0;
     std::copy_n(message + kPrefix, kPrefixSize, found.sender.bytes.begin());
-    const bool lacks_secure_one = is_of_cyclone || (is_of_fastdds && !is_new);
-    if (!lacks_secure_one) return found;
+    if (!is_of_cyclone) return found;
     auto& copy = found.as_secure;
     copy.assign(message, message + size);
     const auto at = copy.begin() + (ids - message);

@@ -9,7 +9,7 @@
 #include <string>
 #include <utility>
 
-#include "common/bus/fastdds/older_peers.hpp"
+#include "common/bus/fastdds/plain_announcements.hpp"
 
 namespace sls::bus {
 
@@ -22,10 +22,10 @@ namespace detail {
 
 namespace rtps = eprosima::fastdds::rtps;
 
-class OlderPeersTransport : public rtps::ChainingTransport {
+class PlainAnnouncementsTransport : public rtps::ChainingTransport {
  public:
-  OlderPeersTransport(const rtps::ChainingTransportDescriptor& descriptor,
-                      AnnouncementHandler handle)
+  PlainAnnouncementsTransport(const rtps::ChainingTransportDescriptor& descriptor,
+                              AnnouncementHandler handle)
       : ChainingTransport(descriptor), handle_(std::move(handle)) {}
 
   rtps::TransportDescriptorInterface* get_configuration() override {
@@ -53,25 +53,25 @@ class OlderPeersTransport : public rtps::ChainingTransport {
   const AnnouncementHandler handle_;
 };
 
-struct OlderPeersDescriptor : rtps::ChainingTransportDescriptor {
-  OlderPeersDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> transport,
-                       AnnouncementHandler handler)
+struct PlainAnnouncementsDescriptor : rtps::ChainingTransportDescriptor {
+  PlainAnnouncementsDescriptor(std::shared_ptr<rtps::TransportDescriptorInterface> transport,
+                               AnnouncementHandler handler)
       : ChainingTransportDescriptor(std::move(transport)), handle(std::move(handler)) {}
   rtps::TransportInterface* create_transport() const override {
-    return new OlderPeersTransport(*this, handle);
+    return new PlainAnnouncementsTransport(*this, handle);
   }
   const AnnouncementHandler handle;
 };
 
 }  // namespace detail
 
-/// Lets a secured participant discover those of Fast DDS before 2.13 (older_peers.hpp): each of its
+/// Lets a secured participant discover those of Cyclone DDS (plain_announcements.hpp): each of its
 /// transports also passes on their announcements as the secure ones that they do not send. `handle`
 /// is told the announcements of all participants, also our own.
 inline void hear_announcements(eprosima::fastdds::dds::DomainParticipantQos& qos,
                                const AnnouncementHandler& handle) {
   for (auto& transport : qos.transport().user_transports)
-    transport = std::make_shared<detail::OlderPeersDescriptor>(transport, handle);
+    transport = std::make_shared<detail::PlainAnnouncementsDescriptor>(transport, handle);
 }
 
 }  // namespace sls::bus
