@@ -21,7 +21,7 @@
 #include "bench/stamps.hpp"
 #include "bench/timer_jitter.hpp"
 #include "closed_loop/flight.hpp"
-#include "closed_loop/recorded_flight.hpp"
+#include "closed_loop/flight_recorder.hpp"
 #include "common/app/run_main.hpp"
 #include "common/bus/convert.hpp"
 #include "common/bus/qos_file.hpp"

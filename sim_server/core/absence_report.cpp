@@ -17,20 +17,23 @@ using namespace std::chrono_literals;
 }  // namespace
 
 AbsenceReport::AbsenceReport(const Fleet& fleet, const ParticipantWatch& watch, RunReport& report,
-                             bool is_lockstep)
-    : fleet_(fleet), watch_(watch), report_(report), is_lockstep_(is_lockstep) {}
+                             const config::Sync& sync)
+    : fleet_(fleet),
+      watch_(watch),
+      report_(report),
+      is_lockstep_(sync.mode == config::SyncMode::kLockstep),
+      give_up_s_(sync.calc_controller_patience_s()) {}
 
 void AbsenceReport::attend(Action action, sync::Time now) {
-  const double give_up_s = fleet_.vehicles().front()->absence.give_up_s();
   const double absence_s = fleet_.calc_longest_absence_s(now);
   if (action == Action::kGiveUp) {
     std::string refusals;
     for (const auto& vehicle : fleet_.vehicles())
       if (refusals.empty()) refusals = fleet_.describe_refusals(*vehicle);
-    give_up(give_up_s, refusals);
+    give_up(give_up_s_, refusals);
   }
   if (!wait_)
-    wait_.emplace(now, give_up_s - absence_s,
+    wait_.emplace(now, give_up_s_ - absence_s,
                   std::max<sync::Duration>(0s, 1s - sync::to_duration(absence_s)));
   // In real time held steps are counted, not announced: a few of them are normal.
   const bool is_news = action != action_ &&

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "common/sync/patience.hpp"
-#include "sim_server/core/controller_absence.hpp"
 #include "sim_server/core/participant_watch.hpp"
 
 namespace sls::sim {
@@ -14,11 +13,11 @@ namespace sls::sim {
 class AbsenceReport {
  public:
   AbsenceReport(const Fleet& fleet, const ParticipantWatch& watch, RunReport& report,
-                bool is_lockstep);
+                const config::Sync& sync);
 
   /// A vehicle got no answer, and `action` is what is done about it.
   /// @throws std::runtime_error if `action` is kGiveUp.
-  void attend(ControllerAbsence::Action action, sync::Time now);
+  void attend(AbsenceAction action, sync::Time now);
   /// The answers to the step in work were taken: announces take-overs and the end of an absence.
   void note_answers(sync::Time now);
   /// @throws std::runtime_error if a client's answer was refused and no other client answers.
@@ -26,7 +25,7 @@ class AbsenceReport {
   void note_rest(sync::Duration rest);
 
  private:
-  using Action = ControllerAbsence::Action;
+  using Action = AbsenceAction;
 
   void announce_take_overs(sync::Time now);
   [[noreturn]] void give_up(double waited_s, const std::string& refusals) const;
@@ -35,6 +34,7 @@ class AbsenceReport {
   const ParticipantWatch& watch_;
   RunReport& report_;
   const bool is_lockstep_;
+  const double give_up_s_;
   std::optional<sync::Patience> wait_;
   std::optional<sync::Time> announced_;  // start of the announced absence
   std::optional<Action> action_;         // the last one that was announced

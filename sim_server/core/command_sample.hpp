@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -21,5 +22,8 @@ struct CommandSample {
   std::string client_name;
   std::vector<OfferedAnswer> answers;
 };
+
+/// Samples that wait for the core at most, so that a flood of them fills no memory.
+inline constexpr std::size_t kMostWaitingCommands = 4096;
 
 }  // namespace sls::sim

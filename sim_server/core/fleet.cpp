@@ -44,7 +44,7 @@ bool Fleet::are_all_settled() const {
 
 bool Fleet::is_anybody_absent() const {
   return std::any_of(vehicles_.begin(), vehicles_.end(),
-                     [](const auto& vehicle) { return vehicle->absence.is_acting(); });
+                     [](const auto& vehicle) { return vehicle->is_absent(); });
 }
 
 bool Fleet::is_finished() const {

@@ -69,13 +69,12 @@ void LockstepPacing::resend(sync::Time now) {
 
 /// Settles the step unless, by the policy, a vehicle without an answer still waits for it.
 void LockstepPacing::fly_without_answers(sync::Time now) {
-  using Action = ControllerAbsence::Action;
+  using Action = AbsenceAction;
   const double step_wait_s = sync::to_seconds(now - sent_);
   std::vector<std::pair<Vehicle*, Action>> actions;
   for (const auto& vehicle : run_.fleet.vehicles())
     if (!vehicle->gate.accepted())
-      actions.emplace_back(vehicle.get(),
-                           vehicle->absence.decide(step_wait_s, vehicle->calc_absence_s(now)));
+      actions.emplace_back(vehicle.get(), vehicle->decide(run_.scenario.sync, step_wait_s, now));
   const auto [least, most] =
       std::minmax_element(actions.begin(), actions.end(),
                           [](const auto& a, const auto& b) { return a.second < b.second; });

@@ -102,11 +102,11 @@ void RealtimePacing::pass_over_silent_clients(sync::Time now) {
 }
 
 void RealtimePacing::fly_without_answers(sync::Time now) {
-  using Action = ControllerAbsence::Action;
+  using Action = AbsenceAction;
   Action most = Action::kWait;
   for (const auto& vehicle : run_.fleet.vehicles()) {
     if (vehicle->is_settled()) continue;
-    const Action action = vehicle->absence.decide(0.0, vehicle->calc_absence_s(now));
+    const Action action = vehicle->decide(run_.scenario.sync, 0.0, now);
     most = std::max(most, action);
     if (action != Action::kGiveUp) vehicle->fly_without_answer(action);
   }

@@ -23,7 +23,7 @@ struct RunParts {
         report(outputs, fleet, run_id, scenario.sync),
         watch(scenario, run_id, fleet, report),
         control(run_id, fleet.ids(), begins_paused),
-        absence(fleet, watch, report, scenario.sync.mode == config::SyncMode::kLockstep) {}
+        absence(fleet, watch, report, scenario.sync) {}
 
   /// Remarks of the plants since the last call become events of this step.
   void announce_remarks(sync::Time now) {

@@ -15,7 +15,6 @@ double calc_elapsed_s(const std::optional<sync::Time>& since, sync::Time now) {
 
 Vehicle::Vehicle(const config::Scenario& fleet, std::uint64_t run_id, model::StepRecord& record)
     : gate(run_id, record.vehicle_id, make_answer_limits(fleet)),
-      absence(fleet.sync),
       parameters_(config::make_vehicle_scenario(fleet, record.vehicle_id).vehicle),
       force_limit_n_(fleet.controller.force_limit_n),
       record_(record) {}
@@ -35,21 +34,21 @@ void Vehicle::keep_late_answer(const OfferedAnswer& offered) {
 void Vehicle::hold(const OfferedAnswer& offered) {
   held_ = offered;
   has_held_ = true;
-  absence.answered();
+  steps_without_answer_ = 0;
   absent_since_.reset();
   refused_since_.reset();
 }
 
-void Vehicle::fly_without_answer(ControllerAbsence::Action action) {
+void Vehicle::fly_without_answer(AbsenceAction action) {
   // Before the first answer there is nothing to hold.
-  if (action == ControllerAbsence::Action::kHold && has_held_) {
+  if (action == AbsenceAction::kHold && has_held_) {
     settle(AnswerKind::kHeld);
   } else {
     settle(AnswerKind::kFailSafe);
     record_.client_name = flown_by_ = kFailSafeName;
     record_.answer.f_Q_W = calc_fail_safe_force(parameters_, record_.truth, force_limit_n_);
   }
-  absence.flown_without_answer();
+  ++steps_without_answer_;
 }
 
 void Vehicle::settle(AnswerKind kind) {
@@ -75,6 +74,24 @@ void Vehicle::complete_record() {
 bool Vehicle::is_finished() const {
   return record_.kind == AnswerKind::kAccepted &&
          record_.answer.mission == model::MissionPhase::kFinished;
+}
+
+AbsenceAction Vehicle::decide(const config::Sync& rules, double step_wait_s, sync::Time now) const {
+  using config::ControllerPolicy;
+  if (calc_absence_s(now) >= rules.calc_controller_patience_s()) return AbsenceAction::kGiveUp;
+  const auto& absence = rules.wait.controller;
+  const double period_s = static_cast<double>(rules.period_ns) * 1e-9;
+  if (rules.mode != config::SyncMode::kRealtime) {
+    if (absence.policy == ControllerPolicy::kWait || absence.policy == ControllerPolicy::kStop)
+      return AbsenceAction::kWait;
+    // The first step waits for the deadline, each later one for one period. Simulated time then
+    // passes no faster than in real time, so a client can return.
+    if (step_wait_s < (is_absent() ? period_s / rules.real_time_factor : absence.deadline_s))
+      return AbsenceAction::kWait;
+    if (absence.policy == ControllerPolicy::kFailsafe) return AbsenceAction::kFailSafe;
+  }
+  const double held_s = static_cast<double>(steps_without_answer_) * rules.period_ns * 1e-9;
+  return held_s < rules.max_hold_s ? AbsenceAction::kHold : AbsenceAction::kFailSafe;
 }
 
 double Vehicle::calc_absence_s(sync::Time now) const { return calc_elapsed_s(absent_since_, now); }

@@ -10,12 +10,20 @@
 #include "common/model/step_record.hpp"
 #include "common/sync/time.hpp"
 #include "sim_server/core/command_gate.hpp"
-#include "sim_server/core/controller_absence.hpp"
 
 namespace sls::sim {
 
 /// Name of the client in records of the server's own force.
 inline constexpr const char* kFailSafeName = "fail-safe";
+
+/// What is done about a vehicle without an answer, by `sync.wait.controller`. Rules:
+/// sim_server/README.md, "Waiting".
+enum class AbsenceAction {
+  kWait,      ///< wait for the answer
+  kHold,      ///< fly this step with the last answer
+  kFailSafe,  ///< fly this step with the fail-safe force
+  kGiveUp,    ///< end the run as failed
+};
 
 class Vehicle {
  public:
@@ -34,7 +42,7 @@ class Vehicle {
   /// Takes the answer that the gate accepted for the step in work.
   void take_answer();
   /// Flies the step in work without an answer of its own.
-  void fly_without_answer(ControllerAbsence::Action action);
+  void fly_without_answer(AbsenceAction action);
   /// Holds an answer that came too late for its step, if it is newer than the held one.
   void keep_late_answer(const OfferedAnswer& offered);
 
@@ -63,6 +71,11 @@ class Vehicle {
 
   // --- absence ---
 
+  /// Reaction to the step in work, which has waited `step_wait_s` (wall time) for its answer. In
+  /// real time the call comes when the step's period is over, and the result is never kWait.
+  AbsenceAction decide(const config::Sync& rules, double step_wait_s, sync::Time now) const;
+  /// True if the last step was flown without an answer, and none has come since.
+  bool is_absent() const { return steps_without_answer_ > 0; }
   /// The step in work was published at `time` and has no answer yet.
   void note_waiting(sync::Time time) {
     if (!absent_since_) absent_since_ = time;
@@ -80,7 +93,6 @@ class Vehicle {
   void note_rest(sync::Duration rest);
 
   CommandGate gate;
-  ControllerAbsence absence;
 
  private:
   void hold(const OfferedAnswer& offered);
@@ -94,6 +106,7 @@ class Vehicle {
   OfferedAnswer held_;  // the newest valid answer: accepted, or late
   bool has_held_ = false;
   bool has_ended_late_ = false;
+  std::uint64_t steps_without_answer_ = 0;  // flown, since the last fresh answer
   std::optional<sync::Time> absent_since_;
   std::optional<sync::Time> refused_since_;
 };
