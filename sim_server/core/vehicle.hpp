@@ -16,6 +16,12 @@ namespace sls::sim {
 /// Name of the client in records of the server's own force.
 inline constexpr const char* kFailSafeName = "fail-safe";
 
+/// Force (N, in W) that the server applies when no controller has answered for too long. It holds
+/// the weight (m + m_L) g and damps the quadrotor's velocity; the time constant of the whole mass
+/// is 1 s. Its norm is at most `force_limit`. Source: sim_server/README.md, eq. (5).
+Eigen::Vector3d calc_fail_safe_force(const model::SlungLoadParameters& vehicle,
+                                     const model::SlungLoadState& state, double force_limit);
+
 /// What is done about a vehicle without an answer, by `sync.wait.controller`. Rules:
 /// sim_server/README.md, "Waiting".
 enum class AbsenceAction {
