@@ -13,7 +13,7 @@
 #include "common/app/wait.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"
-#include "sim_server/core/roster.hpp"
+#include "sim_server/core/participants/roster.hpp"
 #include "sim_server/endpoints.hpp"
 #include "sim_server/record_stream.hpp"
 

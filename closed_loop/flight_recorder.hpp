@@ -12,7 +12,7 @@
 #include "common/config/scenario.hpp"
 #include "common/model/step_record.hpp"
 #include "recorder/recording.hpp"
-#include "sim_server/core/status_series.hpp"
+#include "sim_server/core/report/status_series.hpp"
 
 namespace sls::closed_loop {
 

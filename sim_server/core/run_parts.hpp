@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "sim_server/core/absence_report.hpp"
 #include "sim_server/core/outputs.hpp"
+#include "sim_server/core/report/absence_report.hpp"
 #include "sim_server/core/run_control.hpp"
 
 namespace sls::sim {

@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "sim_server/core/lockstep_pacing.hpp"
-#include "sim_server/core/realtime_pacing.hpp"
+#include "sim_server/core/pacing/lockstep_pacing.hpp"
+#include "sim_server/core/pacing/realtime_pacing.hpp"
 
 namespace sls::sim {
 namespace {

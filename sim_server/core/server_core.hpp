@@ -5,9 +5,9 @@
 #include <string>
 
 #include "common/config/scenario.hpp"
-#include "sim_server/core/pacing.hpp"
-#include "sim_server/core/preparation.hpp"
-#include "sim_server/core/recorder_wait.hpp"
+#include "sim_server/core/pacing/pacing.hpp"
+#include "sim_server/core/participants/preparation.hpp"
+#include "sim_server/core/participants/recorder_wait.hpp"
 #include "sim_server/core/run_parts.hpp"
 
 namespace sls::sim {

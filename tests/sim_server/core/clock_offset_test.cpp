@@ -1,4 +1,4 @@
-#include "sim_server/core/client_clocks.hpp"
+#include "sim_server/core/pacing/client_clocks.hpp"
 
 #include <gtest/gtest.h>
 

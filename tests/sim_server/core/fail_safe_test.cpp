@@ -1,4 +1,4 @@
-#include "sim_server/core/vehicle.hpp"
+#include "sim_server/core/step/vehicle.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The force on a vehicle in real time when answers are late, and the beginning of absence.
-#include "sim_server/core/vehicle.hpp"
+#include "sim_server/core/step/vehicle.hpp"
 
 #include <gtest/gtest.h>
 
