@@ -70,8 +70,8 @@ class CoreLoop {
   const bool is_lockstep_;
   Surroundings& around_;
   Backlog& backlog_;
-  // The events that must wait for the main thread, which waits for commands_. What does not fit is
-  // dropped: clients and operators repeat what gets no answer.
+  // The events that must wait for the main thread, which waits for commands_. An event that does
+  // not fit is dropped: clients and operators repeat theirs if no answer comes.
   app::Mailbox<CommandSample> commands_{kMostWaitingCommands};
   app::Mailbox<SimControl> requests_{64};
 

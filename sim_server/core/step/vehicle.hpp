@@ -22,8 +22,7 @@ inline constexpr const char* kFailSafeName = "fail-safe";
 Eigen::Vector3d calc_fail_safe_force(const model::SlungLoadParameters& vehicle,
                                      const model::SlungLoadState& state, double force_limit);
 
-/// What is done about a vehicle without an answer, by `sync.wait.controller`. Rules:
-/// sim_server/README.md, "Waiting".
+/// Reaction to a missing answer, by `sync.wait.controller`. Rules: sim_server/README.md, "Waiting".
 enum class AbsenceAction {
   kWait,      ///< wait for the answer
   kHold,      ///< fly this step with the last answer
