@@ -16,8 +16,8 @@
 #include "common/model/reference.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/mission.hpp"
-#include "sim_server/core/fault_line.hpp"
-#include "sim_server/core/judgement.hpp"
+#include "sim_server/core/answers/judgement.hpp"
+#include "sim_server/core/step/fault_line.hpp"
 #include "sim_server/plants/plant.hpp"
 #include "sim_server/worker_pool.hpp"
 

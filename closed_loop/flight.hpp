@@ -12,8 +12,8 @@
 #include "common/model/step_record.hpp"
 #include "control_client/flight_controller.hpp"
 #include "control_client/laws/control_law.hpp"
-#include "sim_server/core/judgement.hpp"
-#include "sim_server/core/plant_side.hpp"
+#include "sim_server/core/answers/judgement.hpp"
+#include "sim_server/core/step/plant_side.hpp"
 
 namespace sls::closed_loop {
 

@@ -1,4 +1,4 @@
-/// The recording of a flight in one process, in the recorder's files.
+/// A flight in one process with the same recording as a flight of the three programs.
 #pragma once
 
 #include <chrono>
@@ -7,11 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "closed_loop/flight.hpp"
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
 #include "common/model/step_record.hpp"
 #include "recorder/recording.hpp"
-#include "sim_server/core/status_series.hpp"
+#include "sim_server/core/report/status_series.hpp"
 
 namespace sls::closed_loop {
 
@@ -53,5 +54,20 @@ class FlightRecorder {
   sim::StatusSeries status_;
   std::uint64_t step_ = 0;
 };
+
+/// Result of a flight.
+struct FlightEnd {
+  std::uint64_t last_step = 0;
+  std::string failure;       ///< why it failed; empty if every mission was finished
+  bool is_complete = false;  ///< the recording
+};
+
+/// Flies all vehicles of `scenario` in lockstep and records them in `folder`, which must be new or
+/// empty; with `force`, an old recording in it is replaced. The files hold the same data, with the
+/// same certificate, as those of the three programs.
+/// @throws config::ConfigError as Flight does, before the folder is touched, or for the folder.
+/// @throws std::system_error with the name of the file if it cannot be written.
+FlightEnd fly_recorded(const config::Scenario& scenario, const FlightOptions& options,
+                       const std::filesystem::path& folder, bool force);
 
 }  // namespace sls::closed_loop

@@ -3,7 +3,7 @@
 #include <chrono>
 #include <optional>
 
-#include "closed_loop/recorded_flight.hpp"
+#include "closed_loop/flight_recorder.hpp"
 #include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"

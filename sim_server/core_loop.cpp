@@ -2,12 +2,11 @@
 
 #include <algorithm>
 #include <exception>
-#include <variant>
 
 namespace sls::sim {
 
 void CoreLoop::run(ServerCore& core) {
-  events_.clear_commands();  // of an earlier run
+  commands_.take_all();  // of an earlier run
   std::unique_lock lock(core_mutex_);
   core_ = &core;
   unanswered_ = Clock::now();
@@ -50,7 +49,7 @@ bool CoreLoop::wait_until_due() {
     sleeps_until_ = deadline;
     const bool has_slack = is_lockstep_ && awaits_answers_;
     const auto slack = has_slack ? calc_slack(Clock::now() - unanswered_) : Clock::duration::zero();
-    if (backlog_.is_waiting() || events_.wait(deadline + slack)) return false;
+    if (backlog_.is_waiting() || commands_.wait(deadline + slack)) return false;
   } while (Clock::now() < deadline_.load());
   return true;
 }
@@ -60,12 +59,9 @@ CoreLoop::Clock::duration CoreLoop::calc_slack(Clock::duration duration) {
 }
 
 void CoreLoop::deliver_events(ServerCore& core) {
-  for (EventQueue::Event& event : events_.take_all()) {
-    if (auto* sample = std::get_if<CommandSample>(&event))
-      core.on_commands(*sample);
-    else
-      core.on_request(std::get<SimControl>(event), around_, Clock::now());
-  }
+  for (const SimControl& request : requests_.take_all())
+    core.on_request(request, around_, Clock::now());
+  for (CommandSample& sample : commands_.take_all()) core.on_commands(sample);
 }
 
 /// The middleware's thread has called the core: wakes the main thread if it has work now, or
@@ -75,7 +71,7 @@ void CoreLoop::note_deadline() {
   deadline_ = deadline;
   if (deadline < sleeps_until_.load() || backlog_.is_waiting() ||
       core_->phase() != ServerCore::Phase::kAwaitingAnswers)
-    events_.interrupt();
+    commands_.interrupt();
 }
 
 }  // namespace sls::sim

@@ -5,9 +5,9 @@
 #include <mutex>
 #include <utility>
 
+#include "common/app/mailbox.hpp"
 #include "sim_server/backlog.hpp"
 #include "sim_server/core/server_core.hpp"
-#include "sim_server/event_queue.hpp"
 
 namespace sls::sim {
 
@@ -38,20 +38,22 @@ class CoreLoop {
   void write_waiting(ServerCore& core);
 
   /// A request of an operator came, on any thread.
-  void put(const SimControl& request) { events_.put(request); }
+  void put(const SimControl& request) {
+    if (requests_.put(request)) commands_.interrupt();
+  }
   /// A sample of sls/command came, on any thread. `fill(sample)` fills in all of it.
   template <class Fill>
   void put(const Fill& fill) {
     if (is_lockstep_ && pass_on(fill)) return;
     CommandSample sample;
     fill(sample);
-    events_.put(std::move(sample));
+    commands_.put(std::move(sample));
   }
 
  private:
   template <class Fill>
   bool pass_on(const Fill& fill) {
-    if (main_wants_core_ || !events_.is_empty()) return false;
+    if (main_wants_core_ || !commands_.is_empty() || !requests_.is_empty()) return false;
     const std::unique_lock lock(core_mutex_, std::try_to_lock);
     if (!lock || !core_ || core_->phase() != ServerCore::Phase::kAwaitingAnswers ||
         core_->has_news(around_))
@@ -68,7 +70,10 @@ class CoreLoop {
   const bool is_lockstep_;
   Surroundings& around_;
   Backlog& backlog_;
-  EventQueue events_;
+  // The events that must wait for the main thread, which waits for commands_. An event that does
+  // not fit is dropped: clients and operators repeat theirs if no answer comes.
+  app::Mailbox<CommandSample> commands_{kMostWaitingCommands};
+  app::Mailbox<SimControl> requests_{64};
 
   std::mutex core_mutex_;
   ServerCore* core_ = nullptr;  // under the mutex; null while no run flies

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "sim_server/core/surroundings.hpp"
+#include "sim_server/core/participants/surroundings.hpp"
 #include "sim_server/endpoints.hpp"
 #include "sim_server/outbox.hpp"
 

@@ -7,7 +7,7 @@
 
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
-#include "sim_server/core/command_sample.hpp"
+#include "sim_server/core/answers/command_sample.hpp"
 #include "sim_server/plants/plant.hpp"
 
 namespace sls::sim {

@@ -13,7 +13,7 @@
 #include "common/bus/message_size.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/queued_writer.hpp"
-#include "sim_server/core/fleet.hpp"
+#include "sim_server/core/step/fleet.hpp"
 
 namespace sls::sim {
 

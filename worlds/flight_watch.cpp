@@ -8,7 +8,7 @@
 
 #include "common/bus/topics.hpp"
 #include "common/sync/membership.hpp"
-#include "sim_server/core/retransmission_timer.hpp"
+#include "sim_server/core/pacing/retransmission_timer.hpp"
 #include "worlds/program.hpp"
 
 namespace sls::worlds {

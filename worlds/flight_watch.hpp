@@ -15,7 +15,7 @@
 #include "common/bus/peer.hpp"
 #include "common/config/scenario.hpp"
 #include "common/model/step_record.hpp"
-#include "sim_server/core/judgement.hpp"
+#include "sim_server/core/answers/judgement.hpp"
 #include "sls.h"
 #include "worlds/host.hpp"
 

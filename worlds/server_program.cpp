@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "common/bus/convert.hpp"
-#include "sim_server/event_queue.hpp"
 #include "sim_server/messages.hpp"
 
 namespace sls::worlds {
@@ -178,7 +177,7 @@ void ServerProgram::on_commands(const Commands& sample, const Peer::Arrival& arr
     if (!outbox_.empty() || core_->phase() == sim::ServerCore::Phase::kEnded) wake_soon();
     return wake_at(core_->next_deadline());
   }
-  if (events_.size() < sim::EventQueue::kMostCommands) events_.push_back(std::move(received));
+  if (events_.size() < sim::kMostWaitingCommands) events_.push_back(std::move(received));
   wake_soon();
 }
 

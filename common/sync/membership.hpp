@@ -37,7 +37,8 @@ struct Member {
   /// The sender repeats this announcement about every 0.5 s: then its silence means that it is
   /// gone. Clients of this contract need not repeat it.
   bool is_repeated = false;
-  /// The server sets this, for it knows the answers too (sim_server/core/presence.hpp).
+  /// The server sets this, for it knows the answers too
+  /// (sim_server/core/participants/presence.hpp).
   bool is_gone = false;
 
   bool is_silent(Time now) const { return now - heard > kPresumedDeadAfter; }

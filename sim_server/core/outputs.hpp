@@ -8,7 +8,7 @@
 
 #include "common/sync/line.hpp"
 #include "common/sync/time.hpp"
-#include "sim_server/core/command_gate.hpp"
+#include "sim_server/core/answers/command_gate.hpp"
 #include "sls.h"
 
 namespace sls::sim {

@@ -5,8 +5,8 @@
 #include <string>
 #include <utility>
 
-#include "sim_server/core/absence_report.hpp"
 #include "sim_server/core/outputs.hpp"
+#include "sim_server/core/report/absence_report.hpp"
 #include "sim_server/core/run_control.hpp"
 
 namespace sls::sim {
@@ -23,7 +23,7 @@ struct RunParts {
         report(outputs, fleet, run_id, scenario.sync),
         watch(scenario, run_id, fleet, report),
         control(run_id, fleet.ids(), begins_paused),
-        absence(fleet, watch, report, scenario.sync.mode == config::SyncMode::kLockstep) {}
+        absence(fleet, watch, report, scenario.sync) {}
 
   /// Remarks of the plants since the last call become events of this step.
   void announce_remarks(sync::Time now) {

@@ -8,8 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "sim_server/core/lockstep_pacing.hpp"
-#include "sim_server/core/realtime_pacing.hpp"
+#include "sim_server/core/pacing/lockstep_pacing.hpp"
+#include "sim_server/core/pacing/realtime_pacing.hpp"
 
 namespace sls::sim {
 namespace {
@@ -33,8 +33,7 @@ ServerCore::ServerCore(const config::Scenario& scenario, const Start& start,
     : parts_(scenario, start.run_id, start.begins_paused, std::move(fleet), outputs),
       preparation_(parts_, now),
       recorders_(scenario.sync, parts_.report),
-      pacing_(make_pacing(parts_)),
-      judge_(parts_, *pacing_) {
+      pacing_(make_pacing(parts_)) {
   if (start.claims) return;
   preparation_.start_gathering(now);
   phase_ = Phase::kGathering;
@@ -56,10 +55,38 @@ void ServerCore::on_commands(CommandSample& sample) {
   const sync::Time now = sample.arrived.time;
   guard(now, [&] {
     parts_.watch.note_arrival(sample);
-    judge_.judge(sample, phase_ == Phase::kAwaitingAnswers);
+    judge(sample);
     pacing_->received(sample);
     if (phase_ == Phase::kAwaitingAnswers) go_on(now);
   });
+}
+
+void ServerCore::judge(CommandSample& sample) {
+  if (sample.answers.empty() && sample.run_id == parts_.run_id) {
+    parts_.watch.answers().note_empty(sample.sender, sample.step);
+    for (const auto& vehicle : parts_.fleet.vehicles())
+      vehicle->gate.note_sign_of_life(sample.sender);
+  }
+  const bool is_published = phase_ == Phase::kAwaitingAnswers;
+  for (OfferedAnswer& offered : sample.answers) {
+    offered.is_early = !is_published || sample.arrived.time < published_;
+    Vehicle* vehicle = parts_.fleet.find(offered.vehicle_id);
+    // The gate of another vehicle refuses and counts it.
+    if (!vehicle) vehicle = parts_.fleet.vehicles().front().get();
+    note(vehicle->gate.offer(offered, sample.sender), *vehicle, offered, sample);
+  }
+}
+
+void ServerCore::note(Verdict verdict, Vehicle& vehicle, const OfferedAnswer& offered,
+                      const CommandSample& sample) {
+  if (verdict == Verdict::kLate) {
+    parts_.outputs.record_late(vehicle, offered);
+    pacing_->note_late(vehicle, offered, sample.arrived.time);
+  }
+  AnswerCheck& check = parts_.watch.answers();
+  if (*to_string(verdict) != '\0')
+    return check.note_rejected(offered, sample.sender, verdict, parts_.fleet.step());
+  check.note_taken(offered, sample.sender, verdict);
 }
 
 void ServerCore::on_request(const SimControl& request, const Surroundings& around, sync::Time now) {
@@ -184,7 +211,7 @@ void ServerCore::publish_if_allowed(sync::Time now) {
   if (now < pacing_->due()) return;
   phase_ = Phase::kAwaitingAnswers;
   const Moment moment = parts_.outputs.send_states(parts_.fleet);
-  judge_.published(moment.time);
+  published_ = moment.time;
   pacing_->published(moment);
 }
 

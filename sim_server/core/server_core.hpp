@@ -5,10 +5,10 @@
 #include <string>
 
 #include "common/config/scenario.hpp"
-#include "sim_server/core/answer_judge.hpp"
-#include "sim_server/core/pacing.hpp"
-#include "sim_server/core/preparation.hpp"
-#include "sim_server/core/recorder_wait.hpp"
+#include "sim_server/core/pacing/pacing.hpp"
+#include "sim_server/core/participants/preparation.hpp"
+#include "sim_server/core/participants/recorder_wait.hpp"
+#include "sim_server/core/run_parts.hpp"
 
 namespace sls::sim {
 
@@ -103,6 +103,10 @@ class ServerCore {
   template <class Work>
   void guard(sync::Time now, Work work);
 
+  /// Offers each answer to the gate of its vehicle, and tells the verdict.
+  void judge(CommandSample& sample);
+  void note(Verdict verdict, Vehicle& vehicle, const OfferedAnswer& offered,
+            const CommandSample& sample);
   void begin_flight(sync::Time now);
   void go_on(sync::Time now);
   void publish_if_allowed(sync::Time now);
@@ -116,9 +120,9 @@ class ServerCore {
   Preparation preparation_;
   RecorderWait recorders_;
   const std::unique_ptr<Pacing> pacing_;
-  AnswerJudge judge_;
   Phase phase_ = Phase::kClaiming;
   sync::Time looked_{};
+  sync::Time published_{};  // the states of the step in work
   sync::Time rest_began_{};
   End end_ = End::kFailed;
   std::string error_;

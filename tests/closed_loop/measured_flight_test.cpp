@@ -10,7 +10,7 @@
 
 #include "closed_loop/campaign_runs.hpp"
 #include "closed_loop/delay_margin.hpp"
-#include "closed_loop/recorded_flight.hpp"
+#include "closed_loop/flight_recorder.hpp"
 #include "common/config/scenario_draft.hpp"
 #include "common/config/sha256.hpp"
 #include "recorder/manifest.hpp"

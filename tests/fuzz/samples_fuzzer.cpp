@@ -10,7 +10,7 @@
 #include "common/bus/convert.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "recorder/core/stream.hpp"
-#include "sim_server/core/command_gate.hpp"
+#include "sim_server/core/answers/command_gate.hpp"
 #include "sim_server/core/run_control.hpp"
 
 namespace {

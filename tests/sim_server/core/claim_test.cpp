@@ -1,4 +1,4 @@
-#include "sim_server/core/claim.hpp"
+#include "sim_server/core/participants/claim.hpp"
 
 #include <gtest/gtest.h>
 

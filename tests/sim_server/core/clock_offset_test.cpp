@@ -1,4 +1,4 @@
-#include "sim_server/core/clock_offset.hpp"
+#include "sim_server/core/pacing/client_clocks.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,6 @@
 // The acceptance rules of design 6 ("Commands", "Standby"), tested through the interface of the
 // gate.
-#include "sim_server/core/command_gate.hpp"
+#include "sim_server/core/answers/command_gate.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sim_server/core/fail_safe.hpp"
+#include "sim_server/core/step/vehicle.hpp"
 
 #include <gtest/gtest.h>
 

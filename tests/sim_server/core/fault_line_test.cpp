@@ -2,7 +2,7 @@
 // the statistics of independent draws: a count of N draws of probability p has the standard
 // deviation √(N p (1 − p)). The bounds are five of these: a correct program misses them once in two
 // million.
-#include "sim_server/core/fault_line.hpp"
+#include "sim_server/core/step/fault_line.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // The earliest end of a mission against the missions that the client flies.
-#include "sim_server/core/judgement.hpp"
+#include "sim_server/core/answers/judgement.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sim_server/core/participant_check.hpp"
+#include "sim_server/core/participants/participant_check.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
 // From answers to measurements: docs/design.md, sections 6 ("Faults", "Sensing").
-#include "sim_server/core/plant_side.hpp"
+#include "sim_server/core/step/plant_side.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sim_server/core/presence.hpp"
+#include "sim_server/core/participants/presence.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sim_server/core/retransmission_timer.hpp"
+#include "sim_server/core/pacing/retransmission_timer.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,10 +1,10 @@
-#include "sim_server/core/roster.hpp"
+#include "sim_server/core/participants/roster.hpp"
 
 #include <gtest/gtest.h>
 
 #include <limits>
 
-#include "sim_server/core/surroundings.hpp"
+#include "sim_server/core/participants/surroundings.hpp"
 
 namespace sls::sim {
 namespace {

@@ -1,4 +1,4 @@
-#include "sim_server/core/round_trips.hpp"
+#include "sim_server/core/report/status_series.hpp"
 
 #include <gtest/gtest.h>
 

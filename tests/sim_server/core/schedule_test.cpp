@@ -1,4 +1,4 @@
-#include "sim_server/core/schedule.hpp"
+#include "sim_server/core/pacing/schedule.hpp"
 
 #include <gtest/gtest.h>
 

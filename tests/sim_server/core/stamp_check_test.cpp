@@ -1,4 +1,4 @@
-#include "sim_server/core/stamp_check.hpp"
+#include "sim_server/core/participants/stamp_check.hpp"
 
 #include <gtest/gtest.h>
 

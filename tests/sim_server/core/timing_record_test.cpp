@@ -1,4 +1,4 @@
-#include "sim_server/core/timing_record.hpp"
+#include "sim_server/core/report/timing_record.hpp"
 
 #include <gtest/gtest.h>
 

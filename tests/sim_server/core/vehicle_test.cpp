@@ -1,5 +1,5 @@
 // The force on a vehicle in real time when answers are late, and the beginning of absence.
-#include "sim_server/core/vehicle.hpp"
+#include "sim_server/core/step/vehicle.hpp"
 
 #include <gtest/gtest.h>
 
@@ -38,7 +38,7 @@ class VehicleTest : public testing::Test {
   void fly(std::uint64_t step, const std::vector<std::uint64_t>& late) {
     begin(step);
     for (const std::uint64_t answered : late) vehicle_.keep_late_answer(make_answer(answered));
-    vehicle_.fly_without_answer(vehicle_.absence.decide(0.0, 0.0));
+    vehicle_.fly_without_answer(vehicle_.decide(scenario_.sync, 0.0, {}));
   }
   void begin(std::uint64_t step) {
     record_.step = step;
@@ -47,7 +47,8 @@ class VehicleTest : public testing::Test {
   const model::StepRecord& record() const { return vehicle_.record(); }
 
   model::StepRecord record_;
-  Vehicle vehicle_{load_realtime(), kRun, record_};
+  const config::Scenario scenario_ = load_realtime();
+  Vehicle vehicle_{scenario_, kRun, record_};
 };
 
 TEST_F(VehicleTest, AnswersThatAreAllOnePeriodLateFlyItWithoutEnd) {

@@ -1,0 +1,32 @@
+#include "sim_server/core/report/run_report.hpp"
+
+#include <spdlog/fmt/fmt.h>
+
+#include "common/bus/sync_counters.hpp"
+
+namespace sls::sim {
+
+void RunReport::publish(RunPhase phase, const std::string& reason, sync::Time now) {
+  phase_ = phase;
+  SyncCounters counters = link;
+  for (const auto& vehicle : fleet_.vehicles()) bus::add(counters, vehicle->gate.counters());
+  outputs_.send(series.make(
+      {phase, reason, fleet_.step(), fleet_.vehicles().front()->flown_by(), problem, counters},
+      now));
+}
+
+void RunReport::announce(const std::string& event, sync::Time now) {
+  outputs_.log({true, event});
+  publish(event, now);
+}
+
+std::string RunReport::describe_end(sync::Time now) const {
+  const double wall_s = series.calc_wall_s(now);
+  const auto steps = static_cast<double>(fleet_.step());
+  return fmt::format(
+      "finished: {} steps, {} s simulated in {:.2f} s, {:.0f} steps/s, {} resent, {}",
+      fleet_.step(), steps * static_cast<double>(period_ns_) / 1e9, wall_s, steps / wall_s,
+      link.resent(), series.timing.label());
+}
+
+}  // namespace sls::sim
