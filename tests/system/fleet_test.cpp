@@ -21,41 +21,17 @@ const std::vector<std::uint32_t> kAll = {0, 1, 2, 3, 4, 5};
 
 using Changes = std::vector<std::pair<std::string, std::string>>;
 
-/// True if `rows` begins with `beginning`.
-bool begin_with(const std::vector<std::string>& rows, const std::vector<std::string>& beginning) {
-  return rows.size() >= beginning.size() &&
-         std::equal(beginning.begin(), beginning.end(), rows.begin());
-}
-
 class FleetTest : public ProgramsTest {};
 
-TEST_F(FleetTest, RecordsEachOfDifferentVehiclesAsARunOfItAlone) {
-  const config::Scenario fleet = config::load_scenario(scenario("mixed_fleet"));
-  const fs::path together = fly_in_process(scenario("mixed_fleet"), folder / "together");
-  std::size_t shortest = SIZE_MAX, longest = 0;
-  for (std::uint32_t id = 0; id < fleet.vehicles.size(); ++id) {
-    SCOPED_TRACE("vehicle " + std::to_string(id));
-    const std::string name = "vehicle" + std::to_string(id), file = folder / (name + ".yaml");
-    write_bytes(file, config::to_yaml(config::make_vehicle_scenario(fleet, id)));
-    const VehicleRows own = read_vehicle_rows(fly_in_process(file, folder / name), 0);
-    const VehicleRows among = read_vehicle_rows(together, id);
-    EXPECT_TRUE(begin_with(among.state, own.state));
-    EXPECT_TRUE(begin_with(among.command, own.command));
-    EXPECT_TRUE(begin_with(among.reference, own.reference));
-    shortest = std::min(shortest, own.state.size());
-    longest = std::max(longest, own.state.size());
-  }
-  EXPECT_LT(shortest, longest) << "all finish at once: of the end this test sees nothing";
-  EXPECT_EQ(read_manifest(together).at("last_step"), longest - 1);
-  for (std::uint32_t id = 0; id < fleet.vehicles.size(); ++id)
-    EXPECT_EQ(read_vehicle_rows(together, id).command.size(), longest);
-
-  const Table joined(together / "flight.csv");
+TEST_F(FleetTest, OfOneProcessRecordsEachAsAlone) {
+  const std::string file = scenario("mixed_fleet");
+  const fs::path together = fly_in_process(file, folder / "together");
+  expect_each_flies_as_alone(together, file, {0, 1, 2, 3});
+  const Table joined(together / "flight.csv"), states(together / "state.csv");
   EXPECT_EQ(joined.names().back(), "vehicle_id");
-  std::map<std::string, std::size_t> rows;
-  for (std::size_t i = 0; i < joined.rows(); ++i) ++rows[joined.text(i, "vehicle_id")];
-  for (std::uint32_t id = 0; id < fleet.vehicles.size(); ++id)
-    EXPECT_EQ(rows[std::to_string(id)], longest);
+  ASSERT_EQ(joined.rows(), states.rows());
+  for (std::size_t row = 0; row < joined.rows(); ++row)
+    ASSERT_EQ(joined.text(row, "vehicle_id"), states.text(row, "vehicle_id")) << row;
 }
 
 // --- one fleet, spread in different ways ---------------------------------------------------------
