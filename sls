@@ -16,8 +16,7 @@ readonly fuzz_packages=(clang libclang-rt-dev llvm)
 readonly test_packages=(libgmock-dev libmpfr-dev python3-mpmath iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime
   python3-pandas python3-pytest python3-venv slurm-wlm munge python3-distributed chromium mandoc debootstrap mmdebstrap git codespell)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
-readonly bench_packages=(libbenchmark-dev python3-matplotlib chromium valgrind)
-readonly doc_packages=(doxygen python3-sphinx)
+readonly bench_packages=(libbenchmark-dev python3-matplotlib valgrind)
 readonly package_packages=(dpkg-dev file python3-yaml)
 # Packages that only one system has. The launcher installs packages on these systems alone.
 readonly systems=(debian12 debian13)
@@ -121,16 +120,47 @@ is_built() {
   has_tree "$1" && [[ $(ninja -C "$1" -n "${@:2}" 2>/dev/null) == *'ninja: no work to do.' ]]
 }
 
-# show_progress LOG: writes what Ninja says into LOG, and every 15 s how far it is.
+# weigh FOLDER TARGET…: prints for each command of the coming build its weight, a tab, and what Ninja will say of it. A
+# file weighs its lines and 600 for what it includes.
+weigh() {
+  NINJA_STATUS='' ninja -C "$1" -n "${@:2}" | awk -v build="$1" -v root="$root" '
+    function count(file,   line, lines) {
+      while ((getline line < file) > 0) ++lines
+      close(file)
+      return lines
+    }
+    /^ninja: / { next }
+    { weight = 50 }
+    /^Building C(XX)? object / {
+      weight = 600
+      source = $NF
+      sub(/\.o$/, "", source)
+      if (source ~ /\/Unity\//) {
+        while ((getline line < (build "/" source)) > 0) if (split(line, part, "\"") == 3) weight += count(part[2])
+      } else {
+        sub(/CMakeFiles\/[^\/]*\.dir\//, "", source)
+        weight += count(root "/" source)
+      }
+    }
+    { print weight "\t" $0 }'
+}
+
+# show_progress WEIGHTS: passes on what the build says, and says every 15 s how far it is, once a tenth is done.
 show_progress() {
-  local line done all next=15
+  local line weight all=1 done=0 next=15
+  declare -A weights
+  while IFS=$'\t' read -r weight line; do
+    weights[$line]=$weight
+    ((all += weight))
+  done <"$1"
   SECONDS=0
   while IFS= read -r line; do
     echo "$line"
-    [[ $line =~ ^\[([0-9]+)/([0-9]+)\] ]] && ((SECONDS >= next && (done = BASH_REMATCH[1]) > 0)) || continue
-    ((all = BASH_REMATCH[2], next = SECONDS + 15))
-    say "built $done of $all files; about $((SECONDS * (all - done) / done)) s left"
-  done >"$1"
+    [[ $line =~ ^\[([0-9]+)/([0-9]+)\]\ (.+) ]] || continue
+    ((done += ${weights[${BASH_REMATCH[3]}]:-0}, SECONDS >= next && done * 10 >= all)) || continue
+    next=$((SECONDS + 15))
+    say "built ${BASH_REMATCH[1]} of ${BASH_REMATCH[2]} files; about $((SECONDS * (all - done) / done)) s left"
+  done
 }
 
 # configure PRESET [--fresh]: if the tree has another compiler than the preset, CMake would keep none of the preset's
@@ -145,28 +175,31 @@ configure() {
 
 # build_tree PRESET FOLDER [TARGET…]: configures and builds; all targets by default.
 build_tree() {
-  local preset=$1 folder=$2 targets=() fresh=() lock
+  local preset=$1 folder=$2 targets=() fresh=() lock log="$2/build.log" began configured
   shift 2
   (($#)) && targets=(--target "$@")
   mkdir -p "$folder"
   exec {lock}>"$folder/lock"
   flock "$lock"  # Ninja's files do not survive two builds of one folder at once
+  began=$SECONDS
   if ! has_tree "$folder"; then
     fresh=(--fresh)
     rm -f "$folder/Makefile"  # of earlier versions, which built with make
-    say "building for the first time, which takes minutes (log: $folder/build.log)"
+    say "building for the first time, which takes minutes (log: $log)"
   fi
-  if ! { (cd "$root" && configure "$preset" "${fresh[@]}") &&
-    NINJA_STATUS='[%f/%t] ' cmake --build "$folder" --parallel "$(nproc)" "${targets[@]}"; } 2>&1 |
-      show_progress "$folder/build.log"; then
+  if ! { (cd "$root" && configure "$preset" "${fresh[@]}") >"$log" 2>&1 &&
+    { weigh "$folder" "$@" >"$folder/weights" || true; } && configured=$SECONDS &&
+    NINJA_STATUS='[%f/%t] ' cmake --build "$folder" --parallel "$(nproc)" "${targets[@]}" 2>&1 |
+      show_progress "$folder/weights" >>"$log"; }; then
     local reason
     reason="$(awk '/^CMake Error/ { found = 1; next } found && NF { sub(/^ +/, ""); text = text " " $0 }
-      found && !NF && text { print text; exit }' "$folder/build.log")"
-    [[ -z $reason ]] || fail "CMake:$reason (whole log: $folder/build.log)"
-    grep -E -m 20 'error:|Error |ERROR|undefined reference' "$folder/build.log" >&2 || tail -n 20 "$folder/build.log" >&2
-    fail "the build failed (whole log: $folder/build.log)"
+      found && !NF && text { print text; exit }' "$log")"
+    [[ -z $reason ]] || fail "CMake:$reason (whole log: $log)"
+    grep -E -m 20 'error:|Error |ERROR|undefined reference' "$log" >&2 || tail -n 20 "$log" >&2
+    fail "the build failed (whole log: $log)"
   fi
   exec {lock}>&-
+  say "$folder: configured in $((configured - began)) s, compiled in $((SECONDS - configured)) s"
 }
 
 # build_programs TARGET…: brings the targets up to date. The target `flight` is the programs of a flight: it needs
@@ -204,7 +237,9 @@ case ${1:-} in
   @npm) install_node_modules "$2"; exit ;;
   @build) build_programs "${@:2}"; exit ;;
   @tree) build_tree "${@:2}"; exit ;;
+  @complete) [[ -x /usr/bin/python3 ]] || exit 0 ;;  # installs nothing
 esac
 [[ -x /usr/bin/python3 ]] || install_missing python3
 ((is_installing)) || set -- --no-install "$@"
-exec /usr/bin/python3 -BP "$root/python/sls/launcher/__main__.py" "$@"
+unset PYTHONHOME  # of another Python
+exec /usr/bin/python3 -BI "$root/python/sls/launcher/__main__.py" "$@"

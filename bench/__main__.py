@@ -3,14 +3,15 @@
 import argparse
 import json
 import os
+import platform
 import signal
 import sys
 from collections.abc import Callable
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NoReturn
 
-from bench import campaign, instructions, loop, page, parts, start, view
-from bench.machine import describe_machine, now
+from bench import instructions, loop, plant, start
 from bench.programs import MeasurementError, Programs, make_scratch, take_domain
 from bench.results import Figure, format_table
 
@@ -18,17 +19,10 @@ Measure = Callable[[Programs, int, bool], list[Figure]]
 PARTS: dict[str, tuple[Measure, int]] = {  # int: number of rounds
     "lockstep": (loop.measure_lockstep, 3),
     "load": (loop.measure_load, 3),
-    "round-trip": (loop.measure_round_trips, 3),
     "realtime": (loop.measure_realtime, 3),
-    "plant": (parts.measure_plant, 5),
-    "recorder": (parts.measure_recorder, 3),
-    "campaign": (campaign.measure_campaign, 2),
-    "fleet": (parts.measure_fleet, 3),
-    "qos": (loop.measure_qos, 3),
+    "plant": (plant.measure_plant, 5),
     "start": (start.measure_start, 9),
     "instructions": (instructions.measure_instructions, 1),
-    "view": (view.measure_view, 5),
-    "page": (page.measure_page, 3),
 }
 
 
@@ -66,11 +60,20 @@ def parse_arguments() -> argparse.Namespace:
     return options
 
 
-def make_keys(programs: Programs) -> None:
-    """Makes the keys for config/qos/secure.xml."""
-    keys = programs.scratch / "keys"
-    programs.run(Path(__file__).parents[1] / "config/security/keys.sh", keys)
-    os.environ["SLS_KEYS"] = str(keys)
+def read_processor() -> str:
+    for line in Path("/proc/cpuinfo").read_text().splitlines():
+        if line.startswith("model name"):
+            return line.split(": ", 1)[1]
+    return platform.processor()
+
+
+def describe_machine() -> dict[str, Any]:
+    return {"processor": read_processor(), "cores": len(os.sched_getaffinity(0)),
+            "kernel": platform.release()}
+
+
+def now() -> str:
+    return datetime.now(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
 def measure(options: argparse.Namespace, programs: Programs) -> dict[str, Any]:
@@ -80,8 +83,6 @@ def measure(options: argparse.Namespace, programs: Programs) -> dict[str, Any]:
     for name in options.only or PARTS:
         measure_part, rounds = PARTS[name]
         say(f"measures {name}")
-        if name == "qos":
-            make_keys(programs)
         figures += measure_part(programs, 1 if options.quick else rounds, options.quick)
     json_parts["ended"] = now()
     json_parts["figures"] = [figure.to_json() for figure in figures]

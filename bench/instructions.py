@@ -22,7 +22,6 @@ PLANTS = {"analytic": "  model: analytic", "slung_load": "  pendulum: ideal"}
 # Threads that a step wakes, without and with recorder. Server: the one that receives the answer
 # flies the step; another one writes the batches. Recorder: one receives, one writes the files.
 STEP_THREADS = {"sim_server": (1, 2), "control_client": (1, 1), "recorder": (0, 2)}
-BARE_ENDS = {"sim_server": "ping", "control_client": "pong"}
 
 # Objects that do not count: valgrind's processor lacks the instructions of real ones for SHA-256.
 NOT_COUNTED = re.compile(r"^lib(crypto|slow_clock)\.")
@@ -115,8 +114,7 @@ def calc_per_step(fewer: Path, more: Path, count: int) -> Counter[Function]:
 def callgrind(programs: Programs, profile: Path, command: list[str]) -> list[str]:
     library = programs.build / "bench/libslow_clock.so"
     return ["env", f"LD_PRELOAD={library}", "valgrind", "--tool=callgrind",
-            "--separate-threads=yes", "--trace-children=yes", f"--callgrind-out-file={profile}",
-            *command]
+            "--separate-threads=yes", f"--callgrind-out-file={profile}", *command]
 
 
 def run_together(programs: Programs, commands: dict[str, list[str]]) -> None:
@@ -162,28 +160,6 @@ def count_flight(programs: Programs, plant: str, is_recorded: bool) -> dict[str,
                                 STEP_THREADS[name][is_recorded]) for name in words}
 
 
-def sort_by_process(folder: Path) -> list[Path]:
-    """The profiles of `folder`, each named by its process, in the order of their start."""
-    profiles = [file.with_name(file.name.removesuffix("-01")) for file in folder.glob("*-01")]
-    return sorted(profiles, key=lambda profile: int(profile.name))
-
-
-def count_bare_loop(programs: Programs) -> dict[str, Counter[Function]]:
-    """The same of the two ends of the bare loop (ping_pong.cpp)."""
-    folders, commands = {}, {}
-    for domain, steps in enumerate(STEPS, programs.domain):
-        folders[steps] = programs.make_path("")
-        folders[steps].mkdir()
-        commands[f"ping of {steps} steps"] = callgrind(
-            programs, folders[steps] / "%p",
-            [str(programs.probe_program), "ping", "--domain", str(domain),
-             "--round-trips", str(steps)])
-    run_together(programs, commands)
-    # The first process is ping, which starts the other one.
-    first, second = zip(*(sort_by_process(folder) for folder in folders.values()))
-    return {"ping": calc_per_step(*first, 1), "pong": calc_per_step(*second, 1)}
-
-
 def find_part(function: Function) -> str:
     return next(part for part, of_object, of_function in PARTS
                 if re.search(of_object, function[0]) and re.search(of_function, function[1]))
@@ -220,18 +196,15 @@ def format_functions(name: str, functions: Counter[Function], top: int = 25) -> 
 
 
 def measure_instructions(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    bare = count_bare_loop(programs)
     figures = []
     for plant in ("analytic",) if is_quick else PLANTS:
         for is_recorded in (False, True):
             title = f"{plant}, {'with' if is_recorded else 'without'} recorder"
             flight = count_flight(programs, plant, is_recorded)
-            print(title, *format_parts({**bare, **flight}), "", sep="\n")
+            print(title, *format_parts(flight), "", sep="\n")
             for name, functions in flight.items():
                 if is_recorded:
                     print(*format_functions(name, functions), "", sep="\n")
-                bound = bare.get(BARE_ENDS.get(name, ""))
-                figures.append(Figure(
-                    "instructions", f"{name}, {title}", "per step", [functions.total()],
-                    "that end of the bare loop", [bound.total()] if bound else [], LESS))
+                figures.append(Figure("instructions", f"{name}, {title}", "per step",
+                                      [functions.total()], better=LESS))
     return figures

@@ -1,10 +1,10 @@
 """The closed loop: its bounds and speed in lockstep, the parts of a step, its speed on a busy machine,
-its round trips, real time, QoS profiles."""
+real time."""
 
 import csv
 import itertools
+import json
 import os
-import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,14 +14,11 @@ from bench.results import LESS, Figure, Rounds
 
 PERIOD_S = "0.001"
 TRANSPORTS = {"default": "shared memory", "udp": "UDP"}
-PROFILES = ("default", "udp", "lan", "wifi", "secure")
 LOADS = (0, 1, 2, 4)  # busy loops
 QUICK_LOADS = (0, 1)
 WAITING = {True: "spinning", False: "blocking"}  # a thread that waits may spin before it blocks
 FUTEX_BOUND = ("1 / (plant step + control law + hand-over of two processes by futex, the fastest of "
                "spinning and blocking, on one processor and on two)")
-FAST_DDS_BOUND = ("1 / (plant step + control law + raw Fast DDS round trip of the same samples with "
-                  "the same QoS profiles, the fastest likewise)")
 IN_PROCESS_BOUND = "1 / (plant step + control law)"
 
 
@@ -81,11 +78,9 @@ def find_pairs() -> dict[str, tuple[int, int]]:
     return {**pairs, "on two processors": (first, others[0])} if others else pairs
 
 
-def calc_parts(step: float, work: dict[str, float], hand_over: float, raw: float) -> dict[str, float]:
-    """Parts of a step of two processes, µs. A raw round trip of Fast DDS contains two hand-overs, too:
-    the remaining time of it is the part of Fast DDS."""
-    parts = {"plant": work["plant_us"], "law": work["law_us"], "futex": hand_over,
-             "Fast DDS": raw - hand_over}
+def calc_parts(step: float, work: dict[str, float], hand_over: float) -> dict[str, float]:
+    """Parts of a step of two processes, µs."""
+    parts = {"plant": work["plant_us"], "law": work["law_us"], "futex": hand_over}
     return {**parts, "rest": step - sum(parts.values())}
 
 
@@ -94,24 +89,20 @@ class StepCosts:
 
     def __init__(self, programs: Programs, is_quick: bool):
         self.programs = programs
-        self.round_trips = 2000 if is_quick else 20000
+        self.rounds = 2000 if is_quick else 20000
         self.scenario = programs.scenario("figure_eight", lasting(2 if is_quick else 16))
         self.work: dict[str, float] = {}
         self.futex: Times = {}
 
-    def measure_work(self, *flags: str | Path) -> None:
-        """Measures plant and law."""
-        self.work = self.programs.probe("fly", "--scenario", self.scenario, "--period-s", PERIOD_S,
-                                        *flags)
-
-    def measure(self, *flags: str | Path) -> None:
+    def measure(self) -> None:
         """Measures plant and law, then two processes that take turns by futex with the same work."""
-        self.measure_work(*flags)
+        self.work = json.loads(self.programs.run_probe(
+            "fly", "--scenario", self.scenario, "--period-s", PERIOD_S, "--folder", self.programs.make_path("")))
         for may_spin in WAITING:
             for place, (ours, theirs) in find_pairs().items():
-                self.futex[may_spin, place] = self.programs.probe(
-                    "hand-over", "--rounds", str(self.round_trips), "--work-us", str(self.in_process),
-                    "--processors", str(ours), str(theirs), *["--spin"] * may_spin)["mean_us"]
+                self.futex[may_spin, place] = json.loads(self.programs.run_probe(
+                    "hand-over", "--rounds", str(self.rounds), "--work-us", str(self.in_process),
+                    "--processors", str(ours), str(theirs), *["--spin"] * may_spin))["mean_us"]
 
     @property
     def in_process(self) -> float:
@@ -122,23 +113,11 @@ class StepCosts:
         """Time of a round of the futex turns without the work, µs."""
         return find_fastest(self.futex, may_spin) - self.in_process
 
-    def ping(self, qos: str, *flags: str) -> Times:
-        """Round trips of bare Fast DDS. On one processor it only blocks: spinning is of no use there."""
-        programs, times = self.programs, Times()
-        for may_spin, (place, pair) in itertools.product(WAITING, find_pairs().items()):
-            if may_spin and len(set(pair)) == 1:
-                continue
-            times[may_spin, place] = programs.probe(
-                "ping", "--qos", programs.qos(qos), "--domain", str(programs.domain), "--round-trips",
-                str(self.round_trips), "--processors", *map(str, pair), *flags,
-                may_spin=may_spin)["mean_us"]
-        return times
-
 
 # --- lockstep -------------------------------------------------------------------------------------
 
 
-def add_bounds(figures: Rounds, costs: StepCosts, pings: dict[str, Times]) -> None:
+def add_bounds(figures: Rounds, costs: StepCosts) -> None:
     work, bound = costs.work, 1e6 / costs.in_process
     parts = {"plant": work["plant_us"], "law": work["law_us"], "record entries": work["entries_us"]}
     figures.add("one process, without files", "steps/s", 1e6 / sum(parts.values()), IN_PROCESS_BOUND,
@@ -150,25 +129,17 @@ def add_bounds(figures: Rounds, costs: StepCosts, pings: dict[str, Times]) -> No
         name = f"two processes by futex, {WAITING[may_spin]}, {place}"
         figures.add(name, "µs", time_us, better=LESS)
         figures.add(name, "steps/s", 1e6 / time_us)
-    for qos, times in pings.items():
-        for (may_spin, place), time_us in times.items():
-            figures.add(f"raw Fast DDS round trip, {TRANSPORTS[qos]}, {WAITING[may_spin]}, {place}",
-                        "µs", time_us, better=LESS)
 
 
-def add_speeds(figures: Rounds, costs: StepCosts, pings: dict[str, Times],
-               flights: dict[Loop, Flight]) -> None:
+def add_speeds(figures: Rounds, costs: StepCosts, flights: dict[Loop, Flight]) -> None:
     for loop, flight in flights.items():
         speed = flight.steps_per_s
         unrecorded = flights[replace(loop, is_recorded=False)].steps_per_s
-        parts = calc_parts(1e6 / unrecorded, costs.work, costs.hand_over(loop.may_spin),
-                           find_fastest(pings[loop.qos], loop.may_spin))
+        parts = calc_parts(1e6 / unrecorded, costs.work, costs.hand_over(loop.may_spin))
         if loop.is_recorded:
             parts["recorder"] = 1e6 / speed - 1e6 / unrecorded
         figures.add(loop.name, "steps/s", speed, FUTEX_BOUND,
                     1e6 / (costs.in_process + costs.hand_over(may_spin=True)), parts)
-        figures.add(f"{loop.name}, beside Fast DDS", "steps/s", speed, FAST_DDS_BOUND,
-                    1e6 / (costs.in_process + find_fastest(pings[loop.qos], may_spin=True)))
         if loop.is_recorded:
             figures.add(f"{loop.name}, beside the same without", "steps/s", speed,
                         "the same without recorder", unrecorded, goal=0.85, is_goal_of_ratio=True)
@@ -191,11 +162,10 @@ def measure_lockstep(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
     costs = StepCosts(programs, is_quick)
     parts = [Rounds("lockstep") for _ in range(3)]
     for _ in range(rounds):
-        costs.measure("--folder", programs.make_path(""))
-        pings = {qos: costs.ping(qos) for qos in TRANSPORTS}
+        costs.measure()
         flights = {loop: fly_lockstep(programs, loop, 2 if is_quick else 32) for loop in LOOPS}
-        add_bounds(parts[0], costs, pings)
-        add_speeds(parts[1], costs, pings, flights)
+        add_bounds(parts[0], costs)
+        add_speeds(parts[1], costs, flights)
         add_processor_times(parts[2], flights)
     return [figure for part in parts for figure in part.make_figures()]
 
@@ -220,10 +190,9 @@ def measure_load(programs: Programs, rounds: int, is_quick: bool) -> list[Figure
     return figures.make_figures() + comparison.make_figures()
 
 
-# --- distributions --------------------------------------------------------------------------------
+# --- real time ------------------------------------------------------------------------------------
 
 PERCENTILES = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999, "max": 1.0}
-RAW_KEYS = {"p50": "p50_us", "p99": "p99_us", "p99.9": "p999_us", "max": "max_us"}  # of the probe
 
 
 def percentile(values: list[float], share: float) -> float:
@@ -234,102 +203,15 @@ def percentile(values: list[float], share: float) -> float:
 
 
 def parse_stamps(text: str) -> dict[int, int]:
-    """The time in ns at which the state of a step was first written."""
+    """The first time of each step, ns."""
     states: dict[int, int] = {}
     for step, written in csv.reader(text.splitlines()):
         states.setdefault(int(step), int(written))
     return states
 
 
-def calc_step_times(batches: list[dict[int, int]]) -> list[float]:
-    """µs from each state to the next. The run paused after the last state of a batch, and a batch
-    overlaps the previous one: each step counts once, and steps with a pause do not count."""
-    times = []
-    seen = -1
-    for states in batches:
-        for step in sorted(states):
-            if step > seen and step + 1 in states:
-                times.append((states[step + 1] - states[step]) / 1e3)
-        seen = max(states)
-    return times
-
-
-def measure_round_trips(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    """Measured from the history of the writer, which is read while the run is paused."""
-    costs = StepCosts(programs, is_quick)
-    pauses = 1 if is_quick else 8
-    figures = Rounds("round-trip")
-    bound_name = "raw Fast DDS round trip, and plant step and control law for a whole step"
-    for _ in range(rounds):
-        scenario = programs.scenario("figure_eight", lasting(24 if is_quick else 160))
-        batches: list[dict[int, int]] = []
-
-        def look(batches: list[dict[int, int]] = batches) -> None:
-            ctl = [programs.build / "bin/sim_ctl", "--timeout-s", "4", "--domain",
-                   str(programs.domain)]
-            wait_until_running(programs)
-            for _ in range(pauses):
-                time.sleep(0.4)  # steps to measure
-                try:
-                    programs.run(*ctl, "pause")
-                except MeasurementError:
-                    if batches:
-                        return  # the flight is over
-                    raise
-                stamps = programs.run(programs.probe_program, "stamps",
-                                      "--domain", str(programs.domain))
-                batches.append(parse_stamps(stamps))
-                programs.run(*ctl, "resume")
-
-        flight = programs.fly(scenario, qos=with_history(programs), during=look,
-                              server=("--period-s", PERIOD_S))
-        times = calc_step_times(batches)
-        if not times:
-            raise MeasurementError("round-trip: no steps between two pauses")
-        raw = programs.probe("ping", "--domain", str(programs.domain), "--round-trips",
-                             str(costs.round_trips), may_spin=True)
-        costs.measure_work()
-        for name, share in PERCENTILES.items():
-            figures.add(f"state to next state, {name}", "µs", percentile(times, share), bound_name,
-                        raw[RAW_KEYS[name]] + costs.in_process, better=LESS)
-        assert flight.recording
-        with (flight.recording / "status.csv").open() as file:
-            last = list(csv.DictReader(file))[-1]
-        for name in ("p50", "p99"):
-            figures.add(f"round trip as the server sees it, {name}", "µs",
-                        float(last[f"round_trip_{name}_us"]), bound_name, raw[f"{name}_us"],
-                        better=LESS)
-    return figures.make_figures()
-
-
-def with_history(programs: Programs) -> Path:
-    """default.xml with a history of 5,000 states instead of 64; this only costs memory."""
-    depth, longer = "<depth>64</depth></historyQos>", "<depth>5000</depth></historyQos>"
-    limits = "".join(f"<{name}>5000</{name}>" for name in ("max_samples", "max_samples_per_instance"))
-    profile = programs.qos("endpoints").read_text().split("<profiles>")[1].split("<data_reader")[0]
-    assert depth in profile
-    path = programs.make_path(".xml")
-    path.write_text(programs.qos("default").read_text().replace("</profiles>", profile.replace(
-        depth, f"{longer}<resourceLimitsQos>{limits}</resourceLimitsQos>") + "</profiles>"))
-    return path
-
-
-def wait_until_running(programs: Programs) -> None:
-    deadline = time.monotonic() + 60
-    while time.monotonic() < deadline:
-        status = programs.run(programs.build / "bin/sim_ctl", "--domain", str(programs.domain),
-                              "status", "--json")
-        if '"running"' in status:
-            return
-        time.sleep(0.05)
-    raise MeasurementError("the run did not begin within 60 s")
-
-
-# --- real time ------------------------------------------------------------------------------------
-
-
 def calc_lateness(states: dict[int, int], period_ns: int) -> list[float]:
-    """Delay of each state relative to the earliest one, µs, after subtraction of the step's due time."""
+    """Delay of each step relative to the earliest one, µs, after subtraction of its due time."""
     offsets = [written - step * period_ns for step, written in states.items()]
     earliest = min(offsets)
     return [(offset - earliest) / 1e3 for offset in offsets]
@@ -345,17 +227,17 @@ def measure_realtime(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
             stamps: list[str] = []
 
             def listen(stamps: list[str] = stamps) -> None:
-                stamps.append(programs.run(programs.probe_program, "stamps",
-                                           "--live", "--domain", str(programs.domain)))
+                stamps.append(programs.run_probe("stamps", "--domain", str(programs.domain)))
 
             scenario = programs.scenario("figure_eight", lasting(seconds))
-            timer = programs.probe("timer", "--period-s", str(period_s), "--seconds", str(seconds))
+            timer = programs.run_probe("timer", "--period-s", str(period_s), "--seconds", str(seconds))
             flight = programs.fly(scenario, during=listen, server=(
                 "--mode", "realtime", "--rtf", "1", "--period-s", str(period_s)))
-            late = calc_lateness(parse_stamps(stamps[0]), round(period_s * 1e9))
+            late, bound = (calc_lateness(parse_stamps(text), round(period_s * 1e9))
+                           for text in (stamps[0], timer))
             for name, share in PERCENTILES.items():
                 figures.add(f"{title}: states late, {name}", "µs", max(percentile(late, share), 0.001),
-                            bound_name, max(timer[RAW_KEYS[name]] - timer["min_us"], 0.001),
+                            bound_name, max(percentile(bound, share), 0.001),
                             better=LESS)
             figures.add(f"{title}: steps without an answer in time", "steps",
                         count_late(flight.label), better=LESS)
@@ -369,27 +251,3 @@ def count_late(label: str) -> float:
         if words[index + 1] == "of" and words[index + 3] == "late":
             return float(words[index])
     raise MeasurementError(f"expected a label with 'k of n late', got '{label}'")
-
-
-# --- QoS profiles ---------------------------------------------------------------------------------
-
-
-def measure_qos(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    """The closed loop of each profile with its own bound, and a whole short flight, which is mostly
-    discovery and, with security, handshakes."""
-    costs = StepCosts(programs, is_quick)
-    figures, starts = Rounds("qos"), Rounds("qos")
-    for _ in range(rounds):
-        costs.measure()
-        speeds = {}
-        for qos in PROFILES:
-            raw = find_fastest(costs.ping(qos), may_spin=True)
-            speeds[qos] = fly_lockstep(programs, Loop(qos), 2 if is_quick else 16).steps_per_s
-            figures.add(qos, "steps/s", speeds[qos], FAST_DDS_BOUND, 1e6 / (costs.in_process + raw),
-                        calc_parts(1e6 / speeds[qos], costs.work, costs.hand_over(True), raw))
-            starts.add(f"{qos}: a whole short flight", "s",
-                       programs.fly(programs.scenario("short"), qos=qos).wall_s, better=LESS)
-        for qos, speed in speeds.items():
-            if qos != "udp":
-                starts.add(f"{qos}, beside udp", "steps/s", speed, "profile udp", speeds["udp"])
-    return figures.make_figures() + starts.make_figures()

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "bench/flown_run.hpp"
+#include "closed_loop/flight.hpp"
 #include "common/bus/convert.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "common/config/scenario.hpp"
@@ -107,7 +107,12 @@ BENCHMARK(cables_point_step)->Arg(1)->Arg(3)->Arg(6)->Arg(16);
 BENCHMARK(cables_rigid_step)->Arg(1)->Arg(3)->Arg(6)->Arg(16);
 
 const std::vector<model::StepRecord>& records() {
-  static const std::vector<model::StepRecord> flown = fly_records(load(), 1000);
+  static const std::vector<model::StepRecord> flown = [] {
+    std::vector<model::StepRecord> steps;
+    for (closed_loop::Flight flight(load()); steps.size() < 1000;)
+      steps.push_back(*flight.fly_step());
+    return steps;
+  }();
   return flown;
 }
 

@@ -1,70 +1,39 @@
 // The measurements of `./sls bench` for which there is no other program: sls_microbench has those
-// of single functions. Each prints one line of JSON on stdout (stamps: CSV). README.md.
+// of single functions. Prints one line of JSON on stdout; timer and stamps print CSV. README.md.
 #include <sched.h>
-#include <sys/prctl.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <chrono>
-#include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <filesystem>
+#include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
-#include "bench/feeder.hpp"
 #include "bench/hand_over.hpp"
-#include "bench/ping_pong.hpp"
-#include "bench/recording_speed.hpp"
-#include "bench/stamps.hpp"
-#include "bench/timer_jitter.hpp"
 #include "closed_loop/flight.hpp"
 #include "closed_loop/recorded_flight.hpp"
 #include "common/app/run_main.hpp"
+#include "common/app/stop_signal.hpp"
+#include "common/app/wait.hpp"
 #include "common/bus/convert.hpp"
+#include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
-#include "common/bus/spinning.hpp"
 #include "common/config/scenario.hpp"
 
 namespace {
 
 using namespace sls;
+using namespace std::chrono_literals;
+using Clock = std::chrono::steady_clock;
+
+constexpr double kFirstSampleLimit_s = 20.0;
+constexpr auto kSilenceOfRun = 2s;
 
 void print(const nlohmann::json& json) { std::puts(json.dump().c_str()); }
-
-/// The other process of the ping-pong. It ends with this process.
-class AnsweringProcess {
- public:
-  explicit AnsweringProcess(const bench::PingPongOptions& options) {
-    std::vector<std::string> words = {"sls_bench_probe", "pong",
-                                      "--qos",           options.qos_file.string(),
-                                      "--domain",        std::to_string(options.domain),
-                                      "--vehicles",      std::to_string(options.vehicles)};
-    if (options.may_spin) words.push_back("--spin");
-    std::vector<char*> command;
-    for (std::string& word : words) command.push_back(word.data());
-    command.push_back(nullptr);
-    // Under valgrind the link itself names valgrind.
-    const std::string program = std::filesystem::read_symlink("/proc/self/exe");
-    id_ = fork();
-    if (id_ < 0) throw app::RunError("ping: cannot start another process");
-    if (id_ > 0) return;
-    prctl(PR_SET_PDEATHSIG, SIGTERM);
-    execv(program.c_str(), command.data());
-    _exit(127);
-  }
-  ~AnsweringProcess() {
-    kill(id_, SIGTERM);
-    waitpid(id_, nullptr, 0);
-  }
-  AnsweringProcess(const AnsweringProcess&) = delete;
-  AnsweringProcess& operator=(const AnsweringProcess&) = delete;
-
- private:
-  pid_t id_ = -1;
-};
 
 /// The processors of this process and of the other one; empty: no choice.
 using Processors = std::vector<int>;
@@ -82,7 +51,6 @@ void stay_on(const Processors& processors, std::size_t process) {
 /// Times a flight in one process: the parts of a step and, if `folder` is not empty, a whole step
 /// with recorded files.
 nlohmann::json time_flight(const config::Scenario& scenario, const std::filesystem::path& folder) {
-  using Clock = std::chrono::steady_clock;
   using Microseconds = std::chrono::duration<double, std::micro>;
   closed_loop::FlightOptions options;
   options.measures_compute_time = true;
@@ -110,6 +78,59 @@ nlohmann::json time_flight(const config::Scenario& scenario, const std::filesyst
   return json;
 }
 
+/// A line of CSV for each step: its number and a time, ns.
+struct Stamp {
+  std::uint64_t step;
+  std::chrono::nanoseconds at;
+};
+
+void print(const std::vector<Stamp>& stamps) {
+  for (const auto& [step, at] : stamps)
+    std::printf("%llu,%lld\n", static_cast<unsigned long long>(step),
+                static_cast<long long>(at.count()));
+  if (std::fflush(stdout) != 0) throw app::RunError("stdout cannot be written");
+}
+
+/// When a thread woke up that slept until each multiple of `period_s`: the bound of every real-time
+/// loop.
+std::vector<Stamp> measure_timer(double period_s, double seconds) {
+  const std::chrono::duration<double> period(period_s);
+  const auto count = static_cast<std::uint64_t>(seconds / period_s);
+  const auto began = Clock::now();
+  std::vector<Stamp> stamps;
+  for (std::uint64_t k = 1; k <= count && app::stop_signal() == 0; ++k) {
+    std::this_thread::sleep_until(
+        began + std::chrono::duration_cast<Clock::duration>(period * static_cast<double>(k)));
+    stamps.push_back({k, Clock::now() - began});
+  }
+  return stamps;
+}
+
+/// When the server wrote each sample of sls/state, by the server's clock, until no more come.
+/// @throws app::RunError if no sample comes.
+std::vector<Stamp> listen_to_states(const app::CommonOptions& options) {
+  bus::Node node(options.qos_file, options.domain, "bench", "recorder");
+  std::mutex mutex;  // guards stamps and last
+  std::vector<Stamp> stamps;
+  Clock::time_point last;
+  {
+    bus::Reader<States> states(
+        node, bus::kLoopReaderProfile, [&](const States& sample, const bus::PeerId&) {
+          const std::lock_guard lock(mutex);
+          stamps.push_back({sample.step(), states.written().time_since_epoch()});
+          last = Clock::now();
+        });
+    const app::Wait wait(kFirstSampleLimit_s);
+    for (bool is_over = false; !is_over && app::stop_signal() == 0;) {
+      std::this_thread::sleep_for(10ms);
+      const std::lock_guard lock(mutex);
+      if (stamps.empty() && wait.is_over()) throw app::RunError("stamps: no samples");
+      is_over = !stamps.empty() && Clock::now() - last > kSilenceOfRun;
+    }
+  }
+  return stamps;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -118,15 +139,10 @@ int main(int argc, char** argv) {
   app::CommonOptions options;
   options.qos_file = bus::default_qos_file();
   options.log_level = "warning";
-  bench::PingPongOptions ping_pong;
-  bench::StampsOptions stamps;
-  bench::FeederOptions feeder;
   bench::HandOverOptions hand_over;
   Processors processors;
   std::filesystem::path scenario_file, folder;
   std::optional<double> period_s;
-  std::uint32_t vehicles = 1;
-  std::size_t steps = 1000;
   double seconds = 5.0;
 
   const auto add = [&](const char* name, const char* description) {
@@ -134,85 +150,36 @@ int main(int argc, char** argv) {
     app::add_common_options(*command, options);
     return command;
   };
-  const auto add_scenario = [&](CLI::App* command) {
-    command->add_option("--scenario", scenario_file, "scenario (YAML)")->required();
-    command->add_option("--period-s", period_s, "control period in force");
-  };
-  const auto add_vehicles = [&](CLI::App* command) {
-    command->add_option("--vehicles", vehicles, "vehicles in the run")->check(CLI::Range(1, 256));
-  };
-  const auto add_steps = [&](CLI::App* command) {
-    command->add_option("--steps", steps, "steps of the run")->check(CLI::Range(2, 10'000'000));
-  };
-
-  CLI::App* ping = add("ping", "round trips of the loop's samples with a process that answers");
-  CLI::App* pong = add("pong", "that process");
-  for (CLI::App* command : {ping, pong}) {
-    add_vehicles(command);
-    command->add_flag("--spin", ping_pong.may_spin,
-                      "as server and client do in lockstep; of sls_bench_spinning_probe");
-  }
   CLI::App* turns = add("hand-over", "turns of two processes by futex, with work in one of them");
   turns->add_option("--rounds", hand_over.rounds, "measured")->check(CLI::Range(1, 100'000'000));
   turns->add_option("--work-us", hand_over.work_us, "work in each round")
       ->check(CLI::Range(0.0, 1e6));
   turns->add_flag("--spin", hand_over.may_spin, "look for up to 50 µs before a wait blocks");
-  for (CLI::App* command : {ping, turns})
-    command->add_option("--processors", processors, "of this process and of the other one")
-        ->expected(2);
-  ping->add_option("--round-trips", ping_pong.round_trips, "measured")
-      ->check(CLI::Range(1, 100'000'000));
+  turns->add_option("--processors", processors, "of this process and of the other one")
+      ->expected(2);
   CLI::App* fly = add("fly", "the parts of a flight in one process");
-  add_scenario(fly);
-  CLI::App* timer = add("timer", "how late this machine wakes a thread that sleeps until a time");
+  fly->add_option("--scenario", scenario_file, "scenario (YAML)")->required();
+  fly->add_option("--period-s", period_s, "control period in force");
+  fly->add_option("--folder", folder, "for a recording, new");
+  CLI::App* timer = add("timer", "when this machine wakes a thread that sleeps until a time");
   timer->add_option("--period-s", period_s, "between two times")->required();
   timer->add_option("--seconds", seconds, "how long");
-  CLI::App* stamp = add("stamps", "when the states of a run were written");
-  stamp->add_flag("--live", stamps.is_live, "from now on, instead of what the writer has kept");
-  CLI::App* record = add("record", "Recording, fed in this process");
-  add_scenario(record);
-  add_vehicles(record);
-  add_steps(record);
-  record->add_option("--folder", folder, "for the files, which are removed again")->required();
-  fly->add_option("--folder", folder, "for a recording, new");
-  CLI::App* feed = add("feed", "sends a recorder a whole flight as fast as it takes it");
-  add_scenario(feed);
-  add_vehicles(feed);
-  add_steps(feed);
+  add("stamps", "when the states of a run are written, from now on");
 
   return app::run_main(argc, argv, cli, options, "sls_bench", [&] {
-    ping_pong.qos_file = stamps.qos_file = feeder.qos_file = options.qos_file;
-    ping_pong.domain = stamps.domain = feeder.domain = options.domain;
-    ping_pong.vehicles = feeder.vehicles = vehicles;
-    feeder.steps = steps;
-    bus::is_spinning = ping_pong.may_spin;
-    const auto load = [&] {
-      config::Scenario scenario = config::load_scenario(scenario_file);
-      if (period_s) config::override_period(scenario, *period_s);
-      return scenario;
-    };
-    if (*ping) {
-      stay_on(processors, 1);
-      const AnsweringProcess answering(ping_pong);
-      stay_on(processors, 0);
-      print(bench::ping(ping_pong));
-    } else if (*pong) {
-      bench::answer(ping_pong);
-    } else if (*turns) {
+    if (*turns) {
       stay_on(processors, 1);
       bench::HandOver two(hand_over);
       stay_on(processors, 0);
       print(two.measure());
     } else if (*fly) {
-      print(time_flight(load(), folder));
+      config::Scenario scenario = config::load_scenario(scenario_file);
+      if (period_s) config::override_period(scenario, *period_s);
+      print(time_flight(scenario, folder));
     } else if (*timer) {
-      print(bench::measure_timer(*period_s, seconds));
-    } else if (*stamp) {
-      bench::print_stamps(stamps);
-    } else if (*record) {
-      print(bench::measure_recording(load(), vehicles, steps, folder));
+      print(measure_timer(*period_s, seconds));
     } else {
-      print(bench::feed_recorder(load(), feeder));
+      print(listen_to_states(options));
     }
   });
 }

@@ -8,14 +8,11 @@ import signal
 import socket
 import subprocess
 import tempfile
-import threading
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-from bench.machine import read_memory_kb
 
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_S = 300.0  # of one flight
@@ -33,24 +30,13 @@ class Flight:
     steps: int
     steps_per_s: float
     label: str  # timing, as the server prints it
-    wall_s: float  # from the start of the programs to the end of all
-    server_memory_kb: int  # resident, the largest seen
     processor_s: dict[str, float]  # user and system time of each program, start and end included
-    recording: Path | None
     manifest: dict[str, Any]
 
     @property
     def processor_us(self) -> dict[str, float]:
         """Processor time of each program per step."""
         return {name: time * 1e6 / self.steps for name, time in self.processor_s.items()}
-
-    @property
-    def lost(self) -> int:
-        """Number of samples that are missing in the recording."""
-        gaps = self.manifest.get("missing", [])
-        return (sum(gap["to"] - gap["from"] + 1 for gap in gaps)
-                + self.manifest.get("further_missing", {}).get("samples", 0)
-                + self.manifest.get("refused_samples", 0))
 
 
 def take_domain() -> tuple[int, socket.socket]:
@@ -86,7 +72,6 @@ class Programs:
         self.build = build
         self.domain = domain
         self.scratch = scratch
-        self.probe_program = build / "bin/sls_bench_probe"
         self.count = 0
 
     def make_path(self, suffix: str) -> Path:
@@ -128,10 +113,9 @@ class Programs:
                                    f"{done.stderr.strip() or done.stdout.strip()}")
         return done.stdout
 
-    def probe(self, subcommand: str, *words: str | Path, may_spin: bool = False) -> Any:
-        """The JSON that sls_bench_probe prints; with `may_spin`, Fast DDS in it spins while it waits."""
-        program = self.build / "bin/sls_bench_spinning_probe" if may_spin else self.probe_program
-        return json.loads(self.run(program, subcommand, *["--spin"] * may_spin, *words))
+    def run_probe(self, subcommand: str, *words: str | Path) -> str:
+        """What sls_bench_probe prints."""
+        return self.run(self.build / "bin/sls_bench_probe", subcommand, *words)
 
     @contextlib.contextmanager
     def busy_loops(self, count: int) -> Iterator[list[subprocess.Popen[bytes]]]:
@@ -165,7 +149,6 @@ class Programs:
         try:
             for name, flags in commands.items():
                 processes[name] = self.start([programs[name], *flags], logs[name], may_spin)
-            memory = MemoryWatch(processes["sim_server"].pid)  # setpriv becomes the program
             if during:
                 during()
             processor_s = {}
@@ -181,28 +164,7 @@ class Programs:
         if not found:
             raise MeasurementError(f"sim_server: expected a last line with steps/s, got: {said}")
         manifest = json.loads((recording / "manifest.json").read_text()) if recording else {}
-        return Flight(int(found[1]), float(found[2]), found[3].strip(),
-                      time.monotonic() - began, memory.stop(), processor_s, recording, manifest)
-
-
-class MemoryWatch:
-    """The largest resident memory of a process, read ten times a second."""
-
-    def __init__(self, process_id: int):
-        self.largest = 0
-        self.over = threading.Event()
-
-        def watch() -> None:
-            while not self.over.wait(0.1):
-                self.largest = max(self.largest, read_memory_kb(process_id))
-
-        self.thread = threading.Thread(target=watch, daemon=True)
-        self.thread.start()
-
-    def stop(self) -> int:
-        self.over.set()
-        self.thread.join()
-        return self.largest
+        return Flight(int(found[1]), float(found[2]), found[3].strip(), processor_s, manifest)
 
 
 def end_all(processes: list[subprocess.Popen[bytes]]) -> None:

@@ -27,7 +27,7 @@ class MeasureList {
   const std::vector<bool>& stages() const { return stages_; }
   /// The columns of all measures, in order.
   const std::vector<std::string>& columns() const { return columns_; }
-  /// True if `name` is a measure of the list, or the begin of one.
+  /// True if `name` is a measure of the list, or the beginning of one.
   bool has(const std::string& name) const;
 
  private:

@@ -29,7 +29,7 @@ struct StepRows : model::StepRecord {
   double state_time_s = 0;
   double reference_time_s = 0;
   double compute_us = 0;
-  std::string fault;  ///< the fault code; kHeld or kFailSafe if no answer was in force
+  std::string fault;  ///< the error code; kHeld or kFailSafe if no answer was in force
   /// Step at which the stage of the reference began. Only samples contain it, no file does.
   std::optional<std::uint64_t> stage_start_step;
 

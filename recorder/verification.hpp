@@ -31,7 +31,7 @@ std::optional<Difference> find_first_difference(const OpenedRecording& a, const 
 struct Deviation {
   std::string column;  ///< `state.csv, load_x_m`
   double largest =
-      0;  ///< |A − B|; 0: of bits alone, as of −0 and 0; NaN: one is not a number, or a text
+      0;  ///< |A − B|; 0: bits alone differ, as of −0 and 0; NaN: one is not a number, or a text
   std::uint32_t vehicle_id = 0;
   std::uint64_t step = 0;  ///< of the largest; of the first if there is none
 };

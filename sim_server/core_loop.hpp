@@ -18,15 +18,15 @@ namespace sls::sim {
 /// thread only tries to lock the core. If it fails, or if other events wait, the sample waits for
 /// the main thread. In real time every event goes to the main thread.
 ///
-/// In lockstep each step moves the deadline by which its answer must have come. To wake at each of
-/// them cost the main thread 2.5 % of a processor, a thousand times a second. So it sleeps longer
+/// In lockstep each step moves the deadline by which its answer must have come. Waking at each of
+/// them, a thousand times a second, cost the main thread 2.5 % of a processor. So it sleeps longer
 /// (`calc_slack`): a lost sample is sent again later, but a flight takes at most a 32nd longer.
 class CoreLoop {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// How much longer than to a deadline the main thread sleeps where no answer has been missing for
-  /// `duration`: a 32nd of it, at most 10 ms.
+  /// Extra sleep of the main thread after `duration` without a missing answer: a 32nd of it, at
+  /// most 10 ms.
   static Clock::duration calc_slack(Clock::duration duration);
 
   CoreLoop(bool is_lockstep, Surroundings& around, Backlog& backlog)

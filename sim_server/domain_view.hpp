@@ -1,7 +1,5 @@
 #pragma once
 
-#include <set>
-
 #include "sim_server/core/surroundings.hpp"
 #include "sim_server/endpoints.hpp"
 #include "sim_server/outbox.hpp"
@@ -22,7 +20,7 @@ class DomainView : public Surroundings {
   bool stays_on_this_machine() const override { return endpoints_.domain.stays_on_this_machine(); }
   bool has_heard_every_claim() const override { return endpoints_.servers.has_heard_every_claim(); }
   std::uint64_t problems_version() const override { return endpoints_.domain.problems().version(); }
-  Neighbourhood look(bool is_known) override;
+  Neighbourhood find_neighbours() override;
   std::string replace_problems(const std::map<std::string, std::string>& found) override;
   std::string describe_isolation() const override { return endpoints_.domain.describe_isolation(); }
   Queues queues() const override {
@@ -35,12 +33,8 @@ class DomainView : public Surroundings {
   std::string stop_signal() const override;
 
  private:
-  /// Updates `informed_`.
-  void find_informed();
-
   Endpoints& endpoints_;
   const Outbox& outbox_;
-  std::set<bus::PeerId> informed_;  // participants that have acknowledged parameters and status
 };
 
 }  // namespace sls::sim

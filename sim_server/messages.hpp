@@ -22,8 +22,8 @@ Parameters make_parameters_message(std::uint64_t run_id,
                                    const config::Scenario& scenario, const Plant& plant,
                                    const std::string& version);
 
-/// Fills in the content of a sample of sls/command, not its sender and its times. Writes over all
-/// that `received` held and uses its memory again.
+/// Fills in the content of a sample of sls/command, not its sender and its times. Overwrites all
+/// that `received` held and reuses its memory.
 void fill(CommandSample& received, const Commands& sample);
 
 }  // namespace sls::sim

@@ -94,7 +94,7 @@ class RecordStream {
   /// True while the thread is far behind: more than half of the room is used. The lockstep loop
   /// then waits.
   bool is_full() const { return is_full_; }
-  /// Entries that were written so far: shows that the thread gets on.
+  /// Entries that were written so far: shows that the thread makes progress.
   std::uint64_t written() const { return written_; }
   /// Entries that were lost because there was no room, or the middleware refused them.
   std::uint64_t lost() const { return lost_; }

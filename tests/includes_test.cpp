@@ -27,8 +27,7 @@ struct Rule {
 };
 
 const std::vector<Rule> kRules = {
-    {"bench",
-     {"closed_loop", "common", "control_client", "recorder", "sim_server", "Wire", "Fast DDS"}},
+    {"bench", {"closed_loop", "common", "control_client", "sim_server", "Wire", "Fast DDS"}},
     {"closed_loop", {"common", "control_client", "recorder", "sim_server"}},
     {"common/app", {"common/config", "common/sync"}},
     {"common/bus",

@@ -23,7 +23,7 @@ constexpr Instant kKnownAfter = 500ms;
 /// It looks for a stop signal every 20 ms, between two requests.
 constexpr Instant kObeysWithin = 500ms;
 constexpr Instant kGivesUpWithin = 2s;
-/// A server may presume a client dead that was silent for so long, until its next look.
+/// A server may presume a client dead that was silent for this long, until its next look.
 constexpr Instant kForgottenAfter = sync::kPresumedDeadAfter - kSlack;
 
 /// False if a number that the server looks at is not finite.

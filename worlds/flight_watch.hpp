@@ -52,7 +52,7 @@ class FlightWatch {
   /// A status of a flight that runs, not paused.
   void on_running(Instant now);
   void on_interrupted(Instant now) { interrupted_ = now; }
-  /// Its process was stopped, is slow or is so no more: it may be late with everything.
+  /// Its process was stopped or continued, or became slower or faster: it may be late with all.
   void on_disturbed() { is_disturbed_ = true; }
 
  private:

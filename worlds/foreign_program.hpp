@@ -12,9 +12,9 @@
 
 namespace sls::worlds {
 
-/// A client of somebody else that is wrong: it answers late, twice, to other steps, runs and
-/// vehicles, or with nonsense. Its announcement has a mistake, or there is none, so no answer of it
-/// may ever be applied. Some also pretend to be the server of the run.
+/// A foreign client with mistakes: it answers late, twice, to other steps, runs and vehicles, or
+/// with nonsense. Its announcement has a mistake or is missing, so none of its answers may ever be
+/// applied. Some also pretend to be the server of the run.
 class ForeignProgram : public Program {
  public:
   struct Options {

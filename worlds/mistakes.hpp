@@ -10,13 +10,13 @@ namespace sls::worlds {
 
 /// A mistake in the answers of a client that is ready.
 struct AnswerMistake {
-  void (*make)(ControlCommand& answer, std::uint64_t step);  ///< of each copy once more
-  std::uint64_t steps = 1'000'000;  ///< it is made for so many steps: the flight must end
-  int copies = 1;                   ///< each answer is sent so often; 0: samples without answers
+  void (*make)(ControlCommand& answer, std::uint64_t step);  ///< called for each copy
+  std::uint64_t steps = 1'000'000;  ///< with the mistake, because the flight must end
+  int copies = 1;                   ///< of each answer; 0: samples without answers
 };
 const std::vector<AnswerMistake>& list_answer_mistakes();
 
-/// A mistake in an announcement that is right otherwise. Nobody who makes it flies.
+/// A mistake in an otherwise correct announcement. A client that makes it never flies.
 struct AnnouncementMistake {
   void (*make)(Participant& announcement);
   bool is_wild = false;        ///< others wait for the client that makes it

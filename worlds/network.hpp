@@ -35,7 +35,7 @@ struct Link {
   bool is_cut = false;
   Instant mended{0};       ///< the end of its last cut
   double duplicates = 0;   ///< best-effort samples that are sent twice
-  Instant packet_time{0};  ///< a datagram takes so long; 0: no limit
+  Instant packet_time{0};  ///< per datagram; 0: no limit
   Instant busy_until{0};   ///< of the queue before it
 };
 
@@ -102,13 +102,12 @@ class Peer {
   }
   /// Peers with a writer that lacks the deadline that our reader asks for.
   const std::set<bus::PeerId>& missing_deadlines() const { return missing_deadlines_; }
-  /// All peers that were discovered.
   /// The peers that it has discovered, and when.
   const std::map<bus::PeerId, Instant>& known() const { return known_; }
   bool is_acknowledged(TopicId topic) const;
   /// Deadlines without a sample, from the first sample on.
   std::uint64_t missed_deadlines(TopicId topic);
-  /// Samples of `topic` expire no longer, or again.
+  /// Switches LIFESPAN of `topic` off, or on again.
   void ignore_lifespan(TopicId topic, bool is_ignored) {
     readers_[static_cast<std::size_t>(topic)].ignores_lifespan = is_ignored;
   }
@@ -178,7 +177,7 @@ class Network {
   void leave(Peer& peer, bool with_goodbye);
   const std::vector<std::unique_ptr<Peer>>& peers() const { return peers_; }
   Peer* find(const bus::PeerId& id) const;
-  /// Since when both know each other and nothing is cut between them; nothing if that is not so.
+  /// Since when both know each other with no cut between them; nothing if they do not.
   std::optional<Instant> find_connected_since(const bus::PeerId& a, const bus::PeerId& b) const;
   /// True if `observed` has left, and its goodbye to `observer` was lost.
   bool has_missed_leave(const bus::PeerId& observer, const bus::PeerId& observed) const {

@@ -83,7 +83,7 @@ std::optional<std::size_t> find_program(const Plan& plan, const faults::Program&
   return std::nullopt;
 }
 
-/// Gives some clients a wrong word about themselves.
+/// Makes some clients announce something false about themselves.
 void draw_habits(PlannedProgram& client, Random& random) {
   client.has_library = random.chance(0.03);
   client.says_done = random.chance(0.02);
@@ -512,8 +512,8 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
   plan.link = given                            ? make_link(given->link, random)
               : plan.promise == Promise::kCalm ? Link()
                                                : draw_link(random);
-  // Where much is lost, the claims of two servers may meet only when both gather: with 0.02 that
-  // was so in one of 650,000 worlds of all kinds, seed 620959.
+  // With much loss two servers may receive each other's claims only after both have begun to wait
+  // for participants: with 0.02 this happened in one of 650,000 worlds of all kinds, seed 620959.
   if (plan.promise == Promise::kTwoServers) plan.link.loss = std::min(plan.link.loss, 0.005);
   plan.drift = random.chance(0.3) ? random.between(-1e-4, 1e-4) : 0;
   plan.wall_offset_s = random.chance(0.3) ? random.between(-20, 20) : 0;

@@ -24,7 +24,7 @@ struct Fault {
   /// otherwise SimControl.action. After `duration` a killed program begins again, if that is not 0.
   using Kind = config::faults::Kind;
   Kind kind = Kind::kKill;
-  Instant at{0};                      ///< after the begin, or after the step
+  Instant at{0};                      ///< after the start, or after the step
   std::optional<std::uint64_t> step;  ///< when a server publishes this step
   Instant duration{0};
   std::size_t target = 0;

@@ -13,7 +13,7 @@
 namespace sls::worlds {
 
 /// A program in a world: the shell around a core, on one process, with one participant. Its main
-/// thread wakes when it is due; a slow processor lets it wait.
+/// thread wakes when it is due; a slow processor makes it wait.
 class Program {
  public:
   Program(Setting& setting, Host& host, Role role, std::string name)
@@ -49,7 +49,7 @@ class Program {
   std::optional<int> exit_code() const { return exit_code_; }
   const std::string& reason() const { return reason_; }
   Instant ended() const { return ended_; }
-  /// The processor takes so much longer for each wake-up.
+  /// Extra time that the processor takes for each wake-up.
   void set_slowness(Instant delay);
   bool is_slow() const { return slowness_ > Instant(0); }
 

@@ -30,7 +30,7 @@ constexpr Instant kQuietTime = 900ms;
 constexpr Instant kBeginsWithin = 60ms;
 /// The others have heard of it, unless something is in the way.
 constexpr Instant kHeardWithin = 2s;
-/// For so long a server in real time asks for the last answers (sim::RealtimePacing).
+/// Time for which a server in real time asks for the last answers (sim::RealtimePacing).
 constexpr Instant kLastAttempts = 1s;
 
 /// A server waits longer than this for recorders that do not get on.
@@ -109,7 +109,7 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id, const N
   const auto has_won = [&](const auto& item) {
     const auto& [id, other] = item;
     if (other.server == &server || other.server->process().was_killed()) return false;
-    // The last change may not be known.
+    // Others may not have heard of the last change.
     const auto progress = [&](const Run& run) {
       return run.has_status ? sync::calc_progress(run.phase) : 0;
     };
@@ -117,7 +117,7 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id, const N
       return run.has_status && timeline_.now() - run.phase_since < kHeardWithin;
     };
     if (has_changed(other)) return true;
-    // Without its goodbye it counts as present, in a phase it had, until its lease ends.
+    // If its goodbye is lost, others keep its last known phase until its lease expires.
     const bool is_end_unknown = network.has_missed_leave(server.id(), other.server->id());
     if (has_changed(own)) return is_end_unknown || !other.has_ended;
     const int others_progress = is_end_unknown ? other.furthest : progress(other);
@@ -205,9 +205,8 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
   check_stall(run, status.run_id());
 }
 
-/// Those that have not been dead for so long that the others must know.
-/// Those that the server may take for alive: what a killed one said last may have waited for a
-/// server that was stopped.
+/// Those that the server may presume alive: it need not know of a recent death, and the last
+/// message of a killed one may have waited for a server that was stopped.
 int Properties::count_living(const Run& run, const std::set<std::string>& names) const {
   const auto continued = continued_.find(run.server->name());
   const Instant read = continued == continued_.end() ? Instant(0) : continued->second;

@@ -78,7 +78,7 @@ class Properties {
   void on_request(const SimControl& request) { requests_[request.request_id()] = request.run_id(); }
   /// The program finds a participant that writes as a server and claims nothing.
   void on_unclaimed(const Program& program, const Peer& writer);
-  /// `step`: which the recorder says it has completed; `newest`: that came to it, by vehicle.
+  /// `step`: the last complete one, as announced; `newest`: the last one received, by vehicle.
   void on_progress(const Program& recorder, std::int64_t step,
                    const std::map<std::uint32_t, std::int64_t>& newest);
   void on_replied(const Program& server, std::uint64_t request_id, const Network& network);
@@ -86,9 +86,9 @@ class Properties {
   void on_killed(const Program& program);
   void on_stopped(const Program& program);
   void on_continued(const Program& program);
-  /// A program says `text`. `heard`: what it knows of servers.
+  /// A program prints `text`. `heard`: what it knows of servers.
   void on_line(const Program& program, const std::string& text, const sync::Servers& heard);
-  /// Its process was stopped, is slow or is so no more.
+  /// Its process was stopped or continued, or became slower or faster.
   void on_disturbed(const Program& program);
 
   /// At the end of the world.

@@ -25,7 +25,7 @@ class RecorderProgram : public Program {
     bool resumes = false;
     bool follows_servers = false;
     std::size_t queue = record::Arrivals::kMostEntries;  ///< entries that wait to be written
-    Instant disk_delay{0};  ///< each pass of the writing thread takes so much longer
+    Instant disk_delay{0};  ///< extra time of each pass of the writing thread
   };
   RecorderProgram(Setting& setting, Host& host, std::string name, const Options& options);
   void start() override;
@@ -33,7 +33,7 @@ class RecorderProgram : public Program {
   const std::deque<StoredRecording>& recordings() const { return recordings_; }
   const std::filesystem::path& folder() const { return options_.folder; }
   bool has_recorded() const { return has_recorded_; }
-  /// Files and rows in memory cannot be written any more, or again.
+  /// The disk is full, or has room again, for files and for rows in memory.
   void set_disk_full(bool is_full) { is_disk_full_ = is_full; }
   /// The last recording that was closed is complete.
   bool is_complete() const { return recorded_.is_complete; }

@@ -16,7 +16,7 @@ struct SearchOptions {
   std::uint64_t first = 0;
   std::uint64_t last = 9999;  ///< inclusive
   unsigned jobs = 1;
-  std::uint64_t twice_every = 10;           ///< so many worlds are flown once, and one twice
+  std::uint64_t twice_every = 10;           ///< one of so many worlds is flown twice
   std::filesystem::path folder;             ///< for files of worlds; each job has its own in it
   std::size_t most_failures = 10;           ///< the search ends after these
   bool keeps_rows = false;                  ///< one per world, for a table

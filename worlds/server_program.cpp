@@ -257,7 +257,7 @@ bool ServerProgram::has_heard_every_claim() const {
   return true;
 }
 
-sim::Neighbourhood ServerProgram::look(bool is_known) {
+sim::Neighbourhood ServerProgram::find_neighbours() {
   sim::Neighbourhood seen;
   seen.participants = present_members().all();
   seen.add(present_servers().runs(now()));
@@ -266,17 +266,7 @@ sim::Neighbourhood ServerProgram::look(bool is_known) {
   for (const bus::PeerId& peer : peer_.missing_deadlines())
     seen.missing_deadlines[peer] =
         setting_.network.find(peer)->process().name() + ": its writer offers no DEADLINE";
-  seen.is_on_network = !setting_.is_one_machine;
-  seen.announcement_writers = peer_.matched_writers(TopicId::kParticipant);
   seen.state_readers = peer_.matched_readers(TopicId::kState);
-  if (is_known && peer_.is_acknowledged(TopicId::kStatus) &&
-      peer_.is_acknowledged(TopicId::kParameters)) {
-    const auto& readers = peer_.matched_readers(TopicId::kStatus);
-    const auto& of_parameters = peer_.matched_readers(TopicId::kParameters);
-    std::set_intersection(readers.begin(), readers.end(), of_parameters.begin(),
-                          of_parameters.end(), std::inserter(informed_, informed_.end()));
-  }
-  seen.informed = informed_;
   return seen;
 }
 

@@ -73,7 +73,7 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   bool stays_on_this_machine() const override { return setting_.is_one_machine; }
   bool has_heard_every_claim() const override;
   std::uint64_t problems_version() const override { return 0; }
-  sim::Neighbourhood look(bool is_known) override;
+  sim::Neighbourhood find_neighbours() override;
   std::string replace_problems(const std::map<std::string, std::string>& found) override;
   std::string describe_isolation() const override { return ""; }
   Queues queues() const override;
@@ -97,7 +97,6 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   std::size_t steps_ = 0;  // of the entries of batches_
   std::uint64_t written_ = 0;
   std::uint64_t flush_number_ = 0;
-  std::set<bus::PeerId> informed_;
   std::optional<sync::RecordersEnd> linger_;
   std::optional<sync::Time> acknowledged_by_;
   std::optional<closed_loop::FlightCertificate> certificate_;

@@ -10,11 +10,11 @@
 
 namespace sls::worlds {
 
-/// A moment of a world, since its begin; no program of the world sees it (host.hpp).
+/// Time since the world's start. Programs cannot read it: they see the clocks of host.hpp.
 using Instant = std::chrono::nanoseconds;
 
-/// The events of a world in the order of their moments; of equal ones the first that was added
-/// comes first.
+/// The events of a world in the order of their times. Events of the same time keep the order in
+/// which they were added.
 class Timeline {
  public:
   using Action = std::function<void()>;
@@ -35,7 +35,7 @@ class Timeline {
   }
   void after(Instant delay, Action action) { at(now_ + delay, std::move(action)); }
 
-  /// Does what is next; false if there is nothing before `end`.
+  /// Carries out the next event; false if there is none before `end`.
   bool step(Instant end) {
     if (events_.empty() || events_.front().when >= end) return false;
     std::pop_heap(events_.begin(), events_.end(), is_later);

@@ -1,5 +1,5 @@
-/// Conversions between wire types and the model's types. `fill` writes over all that its first
-/// argument held and uses its memory again.
+/// Conversions between wire types and the model's types. `fill` overwrites all that its first
+/// argument held and reuses its memory.
 #pragma once
 
 #include <Eigen/Core>

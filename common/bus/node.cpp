@@ -159,7 +159,7 @@ struct Node::Impl {
     ParticipantListener::Own own;
     if (is_secured) {
       const std::filesystem::path governance = find_file(qos, kGovernance);
-      own = {true, !are_submessages_protected(governance), is_discovery_protected(governance)};
+      own = {true, !are_submessages_protected(governance)};
     }
     announce_what_discovery_lacks(qos);
     listener = std::make_unique<ParticipantListener>(own, &neighbours, &discovered);

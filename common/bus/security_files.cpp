@@ -195,10 +195,6 @@ bool are_submessages_protected(const std::filesystem::path& governance) {
   return read_text(governance).find("<metadata_protection_kind>NONE<") == std::string::npos;
 }
 
-bool is_discovery_protected(const std::filesystem::path& governance) {
-  return read_text(governance).find("<discovery_protection_kind>NONE<") == std::string::npos;
-}
-
 IdentityNames find_identity_names(const std::filesystem::path& certificate,
                                   const std::filesystem::path& authority) {
   return {find_subject(*read_certificate(certificate.string())),

@@ -29,8 +29,4 @@ IdentityNames find_identity_names(const std::filesystem::path& certificate,
 /// do (fastdds/README.md, trap 28).
 bool are_submessages_protected(const std::filesystem::path& governance);
 
-/// True if a signed governance document protects discovery, as keys made with `--mixed-versions` do
-/// not (fastdds/README.md, trap 38).
-bool is_discovery_protected(const std::filesystem::path& governance);
-
 }  // namespace sls::bus

@@ -1,5 +1,5 @@
-/// Faults of networks, machines and programs, as a file says them: one vocabulary for worlds, chaos
-/// and network-table. docs/faults.md describes it.
+/// Faults of networks, machines and programs, as a file describes them: one vocabulary for worlds,
+/// chaos and network-table. docs/faults.md describes it.
 #pragma once
 
 #include <array>
@@ -80,12 +80,12 @@ struct Fault {
   Kind kind = Kind::kKill;
   Program program;                ///< that it hits, or on whose host it happens
   Program to;                     ///< of a cut: the other end
-  std::optional<Span> restart_s;  ///< of a kill or power cut: a new process begins so much later
+  std::optional<Span> restart_s;  ///< of a kill or power cut: time until a new process begins
   Span for_s;
   Span value;  ///< loss, late_s, jump_s, bandwidth_mbit or steps
   Action action = Action::kPause;
   bool is_at_step = false;
-  Span at;  ///< s after the begin, or a step
+  Span at;  ///< s after the start, or a step
 };
 
 /// The network and faults of one flight.

@@ -19,7 +19,7 @@ namespace sls::ros {
 struct Channel {
   std::string topic;      ///< "/tf"
   std::string type;       ///< "tf2_msgs/msg/TFMessage"
-  std::string schema;     ///< ros2msg: definition, then those of its parts behind "===" lines
+  std::string schema;     ///< ros2msg: definition, then those of its parts after "===" lines
   std::string type_hash;  ///< "RIHS01_…"
   bool is_latched = false;
 };

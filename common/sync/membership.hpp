@@ -74,8 +74,8 @@ class Membership {
   /// that have left since.
   int count_done(ParticipantRole role, std::uint64_t run_id) const;
 
-  /// Changes with every announcement that differs from the one before it. Look for yourself at what
-  /// else may happen: a participant leaves, falls silent, or is heard again.
+  /// Changes with every announcement that differs from the one before it. It does
+  /// not change when a participant leaves, falls silent, or is heard again.
   std::uint64_t version() const { return version_; }
 
  private:

@@ -12,7 +12,7 @@ fail() { say "error: $1"; exit "${2:-1}"; }
 
 usage() {
   cat <<'TEXT'
-usage: ./sls keys DIR [--days N] [--force] [--other-vendors] [--mixed-versions]
+usage: ./sls keys DIR [--days N] [--force] [--other-vendors]
        ./sls keys DIR --add ROLE NAME [--days N] [--force]
 
 Makes DIR: certificate authorities (DIR/ca) and one folder for each role,
@@ -22,10 +22,8 @@ signed documents of that role.
   --days N         valid for N days, 1 to 36500 (default: 365)
   --force          replace what is there
   --other-vendors  for programs on another vendor's DDS, such as Cyclone DDS:
-                   also encrypts submessages, which costs a third of the speed
-  --mixed-versions for programs of Debian 12 and of Debian 13 in one flight,
-                   and for Debian 13 with another vendor's DDS: does not
-                   encrypt discovery (topic names, types, QoS)
+                   also encrypts submessages, which costs a third of the speed,
+                   and does not encrypt discovery (topic names, types, QoS)
   --add ROLE NAME  one more identity of that role in DIR/NAME, signed by the
                    authorities in DIR/ca
 
@@ -142,7 +140,7 @@ make_authorities() {
   make_authority permissions "$name"
   # Other vendors' readers send keys only if submessages are protected. Without those keys Fast DDS
   # sends them no samples: common/bus/fastdds/README.md, trap 28.
-  # Fast DDS 2.9 and 3 discover each other only if discovery is not protected: trap 38 there.
+  # Fast DDS 3 discovers Cyclone DDS only if discovery is not protected: trap 38 there.
   sed -e "s|<metadata_protection_kind>NONE<|<metadata_protection_kind>$submessages<|" \
     -e "s|<discovery_protection_kind>ENCRYPT<|<discovery_protection_kind>$discovery<|" \
     "$here/governance.xml" >"$work/governance.xml"
@@ -183,8 +181,7 @@ while (($#)); do
       shift
       ;;
     --force) force=yes ;;
-    --other-vendors) submessages=ENCRYPT ;;
-    --mixed-versions) discovery=NONE ;;
+    --other-vendors) submessages=ENCRYPT discovery=NONE ;;
     --add)
       role=${2:-} name=${3:-}
       [[ " ${roles[*]} " == *" $role "* && -n $role ]] ||

@@ -22,7 +22,7 @@ class ClientCore {
     std::vector<std::uint32_t> vehicle_ids;  ///< ascending, at least one
     Participant identity;                    ///< what every announcement says
     double join_timeout_s = 0;               ///< until a server must be found
-    double server_deadline_s = 0;            ///< a server that is silent for so long is lost
+    double server_deadline_s = 0;            ///< a server that is silent for this long is lost
     bool follows_servers = false;            ///< as in ClientOptions
   };
   /// The knowledge of the shell at a look.

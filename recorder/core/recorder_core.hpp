@@ -29,7 +29,7 @@ class RecorderCore {
   struct Options {
     std::string folder;    ///< for messages
     Participant identity;  ///< the constant part of every announcement
-    /// The run with it is recorded. Ignored if the recording to be continued does not have it.
+    /// Records the run of this vehicle; ignored if the resumed recording lacks it.
     std::uint32_t vehicle = 0;
     bool follows_servers = false;  ///< continue with the run of a server that replaces ours
     std::optional<Unfinished> unfinished;

@@ -90,7 +90,7 @@ class RecordingCore {
   void flush();
 
   Phase phase() const { return phase_; }
-  /// True if the run is in `phase`, as far as its server has told.
+  /// True if `phase` is the last one that the server of the run has published.
   bool has_phase(RunPhase phase) const { return last_status_ && last_status_->phase() == phase; }
   /// As Stream::last_step.
   std::int64_t last_complete_step() const { return stream_.last_step(); }

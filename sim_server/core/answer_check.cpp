@@ -3,7 +3,7 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <cmath>
+#include <utility>
 
 #include "common/config/vehicle_ids.hpp"
 #include "common/config/yaml_node.hpp"
@@ -11,7 +11,6 @@
 namespace sls::sim {
 namespace {
 
-constexpr std::int64_t kStageTolerance_ns = 1'000'000'000;
 /// Fewer answers to earlier steps are no mistake: a client that was stopped for a while sends some.
 constexpr std::uint64_t kFewOldAnswers = 3;
 
@@ -33,16 +32,6 @@ void see(SeenByKind& seen, const char* kind, MakeText make_text) {
 
 }  // namespace
 
-AnswerCheck::AnswerCheck(std::uint64_t run_id, const config::Scenario& scenario,
-                         const std::vector<std::uint32_t>& vehicle_ids)
-    : run_id_(run_id), vehicle_ids_(vehicle_ids), period_ns_(scenario.sync.period_ns) {
-  for (const std::uint32_t id : vehicle_ids) {
-    const config::Scenario own = config::make_vehicle_scenario(scenario, id);
-    vehicles_[id].rod_length = own.vehicle.rod_length;
-    vehicles_[id].mission = own.mission;
-  }
-}
-
 // --- answers arrive ------------------------------------------------------------------------------
 
 /// All participants beyond the first kMostSenders share an entry, which nobody reads.
@@ -52,25 +41,19 @@ AnswerCheck::Sender& AnswerCheck::find_sender(const bus::PeerId& peer) {
   return senders_[senders_.size() < kMostSenders ? peer : bus::PeerId{}];
 }
 
-void AnswerCheck::note_taken(const OfferedAnswer& offered, const bus::PeerId& peer, Verdict verdict,
-                             const model::ControllerMemory& returned,
-                             const model::Measurement& state) {
+void AnswerCheck::note_taken(const OfferedAnswer& offered, const bus::PeerId& peer,
+                             Verdict verdict) {
   Sender& sender = find_sender(peer);
   sender.rejected = 0;
   ++(verdict == Verdict::kDuplicate ? sender.copies : sender.steps);
   if (sender.client_name != offered.client_name) sender.client_name = offered.client_name;
-  if (verdict != Verdict::kAccepted && verdict != Verdict::kHeld) return;
-  Vehicle& vehicle = vehicles_.at(offered.vehicle_id);
-  check_memory(vehicle, offered, sender, returned);
   if (verdict != Verdict::kAccepted) return;
-  vehicle.has_flown = true;
-  check_stage(vehicle, offered, sender);
+  flown_.insert(offered.vehicle_id);
   if (!config::is_utf8(offered.answer.stage_name))
     see(sender.seen, "stage name", [&] {
       return fmt::format("reference.stage_name at step {}: expected UTF-8, got '{}'", offered.step,
                          config::to_printable(offered.answer.stage_name, 64));
     });
-  check_distance(vehicle, offered, state);
 }
 
 void AnswerCheck::note_empty(const bus::PeerId& peer, std::uint64_t step) {
@@ -113,73 +96,6 @@ std::string AnswerCheck::describe_defect(const OfferedAnswer& offered, Verdict v
     default:
       return to_string(verdict);
   }
-}
-
-void AnswerCheck::check_memory(Vehicle& vehicle, const OfferedAnswer& offered, Sender& sender,
-                               const model::ControllerMemory& returned) {
-  const model::ControllerMemory& memory = offered.answer.memory;
-  if (memory.stage < returned.stage) {
-    vehicle.is_stage_lost = true;
-    see(sender.seen, "stage", [&] {
-      return fmt::format(
-          "controller.stage_index at step {}: expected at least {}, as in the state, got {}",
-          offered.step, returned.stage, memory.stage);
-    });
-  }
-  const auto numbers = static_cast<std::size_t>(memory.numbers.size());
-  if (numbers < vehicle.numbers)
-    see(sender.seen, "numbers", [&] {
-      return fmt::format("controller.numbers at step {}: expected {} of them, as before, got {}",
-                         offered.step, vehicle.numbers, numbers);
-    });
-  vehicle.numbers = std::max(vehicle.numbers, numbers);
-}
-
-void AnswerCheck::check_stage(Vehicle& vehicle, const OfferedAnswer& offered, Sender& sender) {
-  const std::uint32_t stage = offered.answer.memory.stage;
-  if (stage != vehicle.stage) {
-    vehicle.stage = stage;
-    vehicle.stage_start_step = offered.step;
-    return;
-  }
-  if (offered.answer.mission != model::MissionPhase::kRunning) return;
-  // Beyond the last stage the mission must be finished at once.
-  const bool is_over = stage >= vehicle.mission.size();
-  const auto* after =
-      is_over ? nullptr : std::get_if<config::LeaveAfter>(&vehicle.mission[stage].leave);
-  if (!is_over && !after) return;
-  const std::int64_t duration_ns = is_over ? 0 : after->duration_ns;
-  const auto steps = static_cast<std::int64_t>(offered.step - vehicle.stage_start_step);
-  if (steps * period_ns_ <= duration_ns + kStageTolerance_ns) return;
-  const auto start_ns = static_cast<std::int64_t>(vehicle.stage_start_step) * period_ns_;
-  const double end_s = static_cast<double>(start_ns + duration_ns) * 1e-9;
-  // A client that lost the stage cannot advance: the same key prevents a second report.
-  see(sender.seen, vehicle.is_stage_lost ? "stage" : "mission", [&] {
-    return is_over ? fmt::format(
-                         "mission at step {}: expected finished after the last stage, "
-                         "which was over at {:g} s, got running",
-                         offered.step, end_s)
-                   : fmt::format(
-                         "controller.stage_index at step {}: expected more than {} (stage "
-                         "'{}' was over at {:g} s), got {} and mission running",
-                         offered.step, stage, config::to_printable(vehicle.mission[stage].name, 32),
-                         end_s, stage);
-  });
-}
-
-void AnswerCheck::check_distance(Vehicle& vehicle, const OfferedAnswer& offered,
-                                 const model::Measurement& state) {
-  const Eigen::Vector3d& reference = offered.answer.reference.position;
-  const double most = kMostRodLengths * vehicle.rod_length;
-  const double load = (state.p_WL - reference).squaredNorm();
-  const double quad = (state.p_WQ - reference).squaredNorm();
-  if (vehicle.is_far || std::max(load, quad) <= most * most) return;
-  vehicle.is_far = true;
-  events_.push_back(fmt::format(
-      "step {}: vehicle {}: {} {:.4g} m from its reference, expected at most {:g} rod lengths "
-      "({:g} m)",
-      offered.step, offered.vehicle_id, load > most * most ? "load" : "quadrotor",
-      std::sqrt(load > most * most ? load : quad), kMostRodLengths, most));
 }
 
 std::string AnswerCheck::describe_rejections(const bus::PeerId& peer) const {
@@ -239,11 +155,10 @@ void AnswerCheck::look_at(Sender& sender, const sync::Member& member, sync::Time
                  fmt::format("{}: sls/command client_name: expected '{}', as announced, got '{}'",
                              describe_participant(member), config::to_printable(announced),
                              config::to_printable(*sender.client_name)));
-  if (member.announcement.done() && steps > 0 &&
-      findings.lasts(member.peer, "done", Findings::kPatience))
+  if (member.announcement.done() && steps > 0 && findings.lasts(member.peer, "done"))
     findings.add(member, "done", "done", "false, as it still answers", "true");
   const std::uint64_t each = copies / std::max<std::uint64_t>(steps, 1);
-  if (each > kMostCopies && findings.lasts(member.peer, "copies", Findings::kPatience))
+  if (each > kMostCopies && findings.lasts(member.peer, "copies"))
     findings.add(member.peer, "copies",
                  fmt::format("{}: sls/command: expected one answer to each state, got over {} "
                              "copies of each",
@@ -252,7 +167,7 @@ void AnswerCheck::look_at(Sender& sender, const sync::Member& member, sync::Time
   if (!sender.rejected_since) sender.rejected_since = now;
   const bool is_few = sender.is_old && sender.rejected < kFewOldAnswers;
   if (!findings.has_any(member.peer) && !is_few &&
-      now - *sender.rejected_since >= kPatienceWithAnswers)
+      now - *sender.rejected_since >= findings.patience())
     findings.add(member.peer, "rejected",
                  fmt::format("{}: sls/command: {} answers rejected, none taken: {}",
                              describe_participant(member), sender.rejected, sender.defect));

@@ -27,10 +27,7 @@ void AnswerJudge::note(Verdict verdict, Vehicle& vehicle, const OfferedAnswer& o
   }
   if (*to_string(verdict) != '\0')
     return check.note_rejected(offered, sample.sender, verdict, run_.fleet.step());
-  check.note_taken(offered, sample.sender, verdict, vehicle.record().answer.memory,
-                   vehicle.state());
-  if (verdict == Verdict::kSuperseded)
-    check.note_superseded(sample.sender, vehicle.gate.superseded_by());
+  check.note_taken(offered, sample.sender, verdict);
 }
 
 }  // namespace sls::sim

@@ -14,7 +14,7 @@ using namespace std::chrono_literals;
 /// A client that sends no answer for this long may have a clock for which LIFESPAN drops them all.
 constexpr auto kMeasured = 1s;
 
-/// Only slow answers for so long are the law's, not those of a busy machine.
+/// Slow answers for this long are due to the law, not to a busy machine.
 constexpr int kSlowAnswers = 3;
 constexpr auto kSlowTime = 1s;
 

@@ -26,8 +26,9 @@ class ClientClocks {
   void note(const CommandSample& sample, std::uint64_t step);
 
   /// Compares the clocks of `controllers` with ours. Returns what is to be announced: a clock that
-  /// is wrong, or agrees again. Where old announcements suggest a wrong clock, or a client is
-  /// silent that does not repeat them, no answer may arrive that would show it.
+  /// is wrong, or agrees again. A clock may also be wrong if the announcements of its client have
+  /// old stamps, or if a client is silent that does not repeat them: LIFESPAN may then drop every
+  /// answer, so no offset is measurable.
   std::vector<std::string> look(const std::vector<sync::Member>& controllers,
                                 std::chrono::nanoseconds lifespan, sync::Time now);
   /// True while LIFESPAN must be ignored, because a clock is or may be wrong.

@@ -20,13 +20,13 @@ class ClockOffset {
   void note(const Exchange& exchange);
 
   /// How far the client's clock is ahead of ours; negative if it is behind. Nothing before
-  /// kLeastAnswers. Link delay does not enter if it is equal both ways; a difference enters with
-  /// its half.
+  /// kLeastAnswers. Link delay has no effect if it is equal both ways; else half of the
+  /// difference enters.
   std::optional<std::chrono::nanoseconds> offset() const;
 
   static constexpr int kLeastAnswers = 8;
-  /// The shortest round trip of the last one to two such times counts: then a clock that was set
-  /// right is seen.
+  /// The shortest round trip of the last one to two such times counts, so a clock that was
+  /// corrected is noticed.
   static constexpr std::chrono::seconds kMemory{2};
 
  private:

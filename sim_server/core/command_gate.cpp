@@ -144,10 +144,7 @@ Verdict CommandGate::judge(const OfferedAnswer& offered, const bus::PeerId& send
   client->identity.is_gone = false;
   client->answered_end = step_ + 1;
   if (!client->is_refused(step_)) client->refusal.clear();  // of an earlier step
-  if (accepted_) {
-    superseded_by_ = accepted_from_;
-    return Verdict::kSuperseded;
-  }
+  if (accepted_) return Verdict::kSuperseded;
   client->held = offered;
   settle();
   return accepted_ ? Verdict::kAccepted : Verdict::kHeld;  // an earlier one was not awaited
@@ -177,10 +174,7 @@ Verdict CommandGate::judge_past(const OfferedAnswer& offered, const bus::PeerId&
   Client* client = find_client(sender);
   if (!client) return Verdict::kWrongStep;
   client->is_new = false;
-  if (first) {
-    superseded_by_ = first->sender;
-    return Verdict::kSuperseded;
-  }
+  if (first) return Verdict::kSuperseded;
   client->refusal.clear();
   first = Past{sender, force};
   return Verdict::kLate;

@@ -90,9 +90,6 @@ class CommandGate {
   };
   const std::optional<TakeOver>& take_over() const { return take_over_; }
 
-  /// After the verdict kSuperseded: the client whose answer to that step was taken.
-  const bus::PeerId& superseded_by() const { return superseded_by_; }
-
   /// Counts a miss: the awaited client did not answer the awaited step. Returns its misses in a
   /// row.
   int count_miss();
@@ -162,7 +159,6 @@ class CommandGate {
   bus::PeerId accepted_from_;
   std::optional<ReadyClient> flyer_;  // sender of the last accepted answer
   std::optional<TakeOver> take_over_;
-  bus::PeerId superseded_by_;
   struct Past {
     bus::PeerId sender;
     Eigen::Vector3d force;

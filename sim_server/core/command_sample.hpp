@@ -11,7 +11,7 @@
 
 namespace sls::sim {
 
-/// A sample of sls/command, and its sample.
+/// A sample of sls/command, and its sender.
 struct CommandSample {
   bus::PeerId sender;
   Moment arrived;

@@ -26,7 +26,7 @@ void Findings::begin(sync::Time now, bool is_on_network) {
   texts_.clear();
   next_due_.reset();
   now_ = now;
-  is_on_network_ = is_on_network;
+  patience_ = is_on_network ? kPatienceOnNetwork : kPatience;
 }
 
 void Findings::add(const bus::PeerId& peer, const std::string& kind, std::string text) {
@@ -38,21 +38,13 @@ void Findings::add(const sync::Member& member, const std::string& kind, const ch
   add(member.peer, kind, describe_field(member, field, expected, got));
 }
 
-bool Findings::lasts(const bus::PeerId& peer, const std::string& kind, sync::Duration patience) {
+bool Findings::lasts(const bus::PeerId& peer, const std::string& kind) {
   const std::string key = make_key(peer, kind);
   seen_.insert(key);
-  const sync::Time due = pending_.try_emplace(key, now_).first->second + patience;
+  const sync::Time due = pending_.try_emplace(key, now_).first->second + patience_;
   if (now_ >= due) return true;
   if (!next_due_ || due < *next_due_) next_due_ = due;
   return false;
-}
-
-bool Findings::lasts_despite_losses(const bus::PeerId& peer, const std::string& kind,
-                                    bool is_informed) {
-  if (!is_on_network_) return lasts(peer, kind, kPatience);
-  // Another key, because the shorter patience begins when the participant is informed.
-  if (is_informed) return lasts(peer, kind + " informed", kPatienceWithInformed);
-  return lasts(peer, kind, kPatienceOnNetwork);
 }
 
 bool Findings::has_any(const bus::PeerId& peer) const {

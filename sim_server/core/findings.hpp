@@ -15,13 +15,12 @@ namespace sls::sim {
 /// which it keeps while it lasts.
 class Findings {
  public:
-  /// A shorter problem is ignored, because discovery takes time.
-  static constexpr std::chrono::milliseconds kPatience{1000};
+  /// A shorter problem is ignored, because discovery and announcements take time, and a busy
+  /// machine loses datagrams, too.
+  static constexpr std::chrono::seconds kPatience{4};
   /// The same on a network that may lose packets: Fast DDS repeats lost discovery data once a
   /// second. With 20 % loss one in a hundred participants needs 8 to 10 s.
-  static constexpr std::chrono::milliseconds kPatienceOnNetwork{15000};
-  /// The same if only an announcement can still be lost, which is repeated ten times a second.
-  static constexpr std::chrono::milliseconds kPatienceWithInformed{2500};
+  static constexpr std::chrono::seconds kPatienceOnNetwork{15};
 
   /// The server looks around at `now`. Forgets what it found before, not how long it has lasted.
   void begin(sync::Time now, bool is_on_network);
@@ -30,13 +29,10 @@ class Findings {
   /// The same of a field of sls/participant.
   void add(const sync::Member& member, const std::string& kind, const char* field,
            const std::string& expected, const std::string& got);
-  /// True if the problem has lasted for `patience` without a break. Call it in each look that sees
-  /// the problem.
-  bool lasts(const bus::PeerId& peer, const std::string& kind, sync::Duration patience);
-  /// The same with the patience that the network needs. `is_informed`: the participant has
-  /// discovered all of us and has the parameters, so it could know better.
-  bool lasts_despite_losses(const bus::PeerId& peer, const std::string& kind,
-                            bool is_informed = false);
+  /// True if the problem has lasted for `patience()` without a break. Call it in each look that
+  /// sees the problem.
+  bool lasts(const bus::PeerId& peer, const std::string& kind);
+  sync::Duration patience() const { return patience_; }
 
   /// True if there is a mistake of `peer` already, which may explain others.
   bool has_any(const bus::PeerId& peer) const;
@@ -46,7 +42,7 @@ class Findings {
 
  private:
   sync::Time now_{};
-  bool is_on_network_ = false;
+  sync::Duration patience_ = kPatience;
   std::map<std::string, std::string> texts_;   // by key
   std::map<std::string, sync::Time> pending_;  // start of each problem
   std::set<std::string> seen_;                 // the pending ones of this look

@@ -54,7 +54,7 @@ std::optional<Defect> find_defect(std::uint64_t step, const model::Answer& answe
   if (find_undefined(answer).first) return Defect::kUndefined;
   if (answer.error_code != ErrorCode::kNone || answer.mission == MissionPhase::kFailed)
     return Defect::kErrorCode;
-  if (!is_finite(answer.reference)) return Defect::kNotFinite;  // its fault would say why
+  if (!is_finite(answer.reference)) return Defect::kNotFinite;  // its error code would say why
   const std::uint32_t stage = answer.memory.stage;
   if (stage > limits.stages) return Defect::kUnknownStage;
   const bool is_over = answer.mission == MissionPhase::kFinished || stage == limits.stages;

@@ -50,8 +50,8 @@ class Outputs {
   virtual void send(const SimStatus& status) = 0;
   virtual void send(const SimControlReply& reply) = 0;
   virtual void log(sync::Line line) = 0;
-  /// Says how a real-time run gets on: on a terminal, where a flight that is not heard for long
-  /// looks as if it hung.
+  /// Shows the progress of a real-time run on a terminal, where a flight that prints nothing for
+  /// long looks as if it hung.
   virtual void show_progress(std::string text) = 0;
 
   /// The flight begins: the shell prepares its threads.

@@ -19,11 +19,6 @@ bool flies_any(const Participant& controller, const Ids& ids) {
                      [&](std::uint32_t id) { return sync::flies_vehicle(controller, id); });
 }
 
-/// True if nothing but chance decides which of the two flies a vehicle.
-bool are_alike(const Participant& a, const Participant& b) {
-  return a.name() == b.name() && a.strength() == b.strength() && flies_any(b, a.vehicle_ids());
-}
-
 bool has_this_contract(const Participant& participant) {
   return participant.contract_sha256() == bus::kContractSha256;
 }
@@ -35,7 +30,7 @@ ParticipantCheck::ParticipantCheck(std::uint64_t run_id, const config::Scenario&
     : run_id_(run_id),
       scenario_sha256_(scenario.sha256),
       vehicle_ids_(vehicle_ids),
-      answers_(run_id, scenario, vehicle_ids) {}
+      answers_(run_id, vehicle_ids) {}
 
 // --- admission -----------------------------------------------------------------------------------
 
@@ -102,7 +97,6 @@ const std::map<std::string, std::string>& ParticipantCheck::look(
     const Neighbourhood& neighbourhood) {
   findings_.begin(neighbourhood.now, neighbourhood.is_on_network);
   for (const sync::Member& member : neighbourhood.participants) look_at(member, neighbourhood);
-  look_for_twins(neighbourhood);
   look_at_strangers(neighbourhood);
   look_at_deadlines(neighbourhood);
   answers_.look(neighbourhood, findings_);
@@ -125,7 +119,7 @@ void ParticipantCheck::look_at(const sync::Member& member, const Neighbourhood& 
                   to_words(announcement.scenario_sha256().to_string()));
   if (const auto vehicles = find_wrong_vehicles(announcement, neighbourhood)) {
     const std::string kind = "vehicle_ids " + *vehicles;
-    if (findings_.lasts_despite_losses(member.peer, kind))
+    if (findings_.lasts(member.peer, kind))
       findings_.add(member, kind, "vehicle_ids", config::to_vehicle_ranges(vehicle_ids_),
                     *vehicles);
   }
@@ -156,10 +150,7 @@ void ParticipantCheck::look_at_run(const sync::Member& member, const Neighbourho
   if (!may_fly_for_us(member.announcement, neighbourhood)) return;
   const std::uint64_t run_id = member.announcement.run_id();
   const std::string kind = "run_id " + to_words(run_id);
-  const bool may_be_of_run_before = run_id != 0 && !neighbourhood.is_on_network;
-  if (may_be_of_run_before ? findings_.lasts(member.peer, kind, kPatienceWithRun)
-                           : findings_.lasts_despite_losses(
-                                 member.peer, kind, neighbourhood.informed.count(member.peer) > 0))
+  if (findings_.lasts(member.peer, kind))
     findings_.add(member, kind, "run_id", to_words(run_id_), to_words(run_id));
 }
 
@@ -177,9 +168,7 @@ void ParticipantCheck::look_at_readiness(const sync::Member& member,
                               : writes        ? "a reader of sls/state"
                                               : "a reader of sls/state and a writer of sls/command";
   const std::string kind = "ready " + missing;
-  // One that is informed knows our endpoints (domain_view.cpp).
-  const bool is_informed = missing.empty() && neighbourhood.informed.count(member.peer) > 0;
-  if (!findings_.lasts_despite_losses(member.peer, kind, is_informed)) return;
+  if (!findings_.lasts(member.peer, kind)) return;
   if (missing.empty())
     findings_.add(member, kind, "ready", "true, as its endpoints are matched", "false");
   else
@@ -199,55 +188,11 @@ std::optional<std::string> ParticipantCheck::find_wrong_vehicles(
   return config::to_vehicle_ranges({wrong.begin(), wrong.end()});
 }
 
-/// Reports clients of one name and strength that fly the same vehicle. A client that was killed
-/// stays listed until its lease ends, and one that replaces it under the same name is no mistake.
-/// So the earlier of two twins must have announced itself since the later one was ready, or both
-/// must have answered a step.
-void ParticipantCheck::look_for_twins(const Neighbourhood& neighbourhood) {
-  const auto now = neighbourhood.now;
-  if (const auto pair = answers_.take_superseded()) rivals_[*pair] = now;
-  for (auto it = rivals_.begin(); it != rivals_.end();)
-    it = now - it->second <= AnswerCheck::kMemory ? std::next(it) : rivals_.erase(it);
-  const auto are_rivals = [&](const sync::Member& earlier, const sync::Member& later) {
-    return rivals_.count({earlier.peer, later.peer}) > 0 ||
-           rivals_.count({later.peer, earlier.peer}) > 0 ||
-           (earlier.heard >= later.ready_since && !earlier.is_silent(now));
-  };
-  for (const sync::Member& later : neighbourhood.participants)
-    for (const sync::Member& earlier : neighbourhood.participants) {
-      const bool is_later =
-          std::tie(later.ready_since, later.peer) > std::tie(earlier.ready_since, earlier.peer);
-      if (!is_later || !flies(later.announcement) || !flies(earlier.announcement) ||
-          !are_alike(earlier.announcement, later.announcement) || !are_rivals(earlier, later))
-        continue;
-      findings_.add(
-          later.peer, "twin",
-          fmt::format("{}: sls/participant name and strength: expected others than those of {}, "
-                      "got the same: which of the two flies is arbitrary",
-                      describe_participant(later), describe_participant(earlier)));
-    }
-}
-
-/// True if the controller is ready to fly in this run.
-bool ParticipantCheck::flies(const Participant& controller) const {
-  return controller.role() == ParticipantRole::ROLE_CONTROLLER && controller.run_id() == run_id_ &&
-         controller.ready() && !controller.done() && has_this_contract(controller) &&
-         controller.scenario_sha256() == scenario_sha256_;
-}
-
 /// Participants that write commands and have not announced themselves.
 void ParticipantCheck::look_at_strangers(const Neighbourhood& neighbourhood) {
   for (const auto& [peer, description] : neighbourhood.command_writers) {
     if (neighbourhood.find(peer) || neighbourhood.explained.count(peer) > 0) continue;
-    // In the usual order of creation the other writer would have been discovered first.
-    const bool has_other_writer = neighbourhood.announcement_writers.count(peer) > 0;
-    const bool is_informed = neighbourhood.informed.count(peer) > 0;
-    const auto patience =
-        neighbourhood.is_on_network
-            ? (has_other_writer ? Findings::kPatienceOnNetwork : kPatienceWithLoss)
-            : (has_other_writer && !is_informed ? kPatienceWithLoss : Findings::kPatience);
-    // Another key, because the shorter patience begins when the participant is informed.
-    if (findings_.lasts(peer, is_informed ? "announcement informed" : "announcement", patience))
+    if (findings_.lasts(peer, "announcement"))
       findings_.add(peer, "announcement",
                     description +
                         ": writes sls/command: expected an announcement in sls/participant, got "
@@ -260,8 +205,7 @@ void ParticipantCheck::look_at_deadlines(const Neighbourhood& neighbourhood) {
     const sync::Member* member = neighbourhood.find(peer);
     if (member && !may_fly_for_us(member->announcement, neighbourhood)) continue;
     const bool is_certain = member && member->announcement.run_id() == run_id_;
-    if (is_certain || findings_.lasts_despite_losses(peer, "deadline"))
-      findings_.add(peer, "deadline", text);
+    if (is_certain || findings_.lasts(peer, "deadline")) findings_.add(peer, "deadline", text);
   }
 }
 

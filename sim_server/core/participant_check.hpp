@@ -2,12 +2,10 @@
 /// participants". No network and no clock here.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "common/config/scenario.hpp"
@@ -22,13 +20,6 @@ namespace sls::sim {
 /// same with their answers.
 class ParticipantCheck {
  public:
-  /// Patience with an announcement: on a network of a client without a writer for it, on this
-  /// machine of one that has not acknowledged parameters and status. A busy machine loses
-  /// datagrams, too.
-  static constexpr std::chrono::milliseconds kPatienceWithLoss{4000};
-  /// Patience with an announcement of a run that has just ended: its client joins the next run.
-  static constexpr std::chrono::milliseconds kPatienceWithRun{1400};
-
   ParticipantCheck(std::uint64_t run_id, const config::Scenario& scenario,
                    const std::vector<std::uint32_t>& vehicle_ids);
 
@@ -59,12 +50,10 @@ class ParticipantCheck {
   void look_at_role(const sync::Member& member, const Neighbourhood& neighbourhood);
   void look_at_run(const sync::Member& member, const Neighbourhood& neighbourhood);
   void look_at_readiness(const sync::Member& member, const Neighbourhood& neighbourhood);
-  void look_for_twins(const Neighbourhood& neighbourhood);
   void look_at_strangers(const Neighbourhood& neighbourhood);
   void look_at_deadlines(const Neighbourhood& neighbourhood);
 
   bool may_fly_for_us(const Participant& controller, const Neighbourhood& neighbourhood) const;
-  bool flies(const Participant& controller) const;
   std::optional<std::string> find_wrong_vehicles(const Participant& announcement,
                                                  const Neighbourhood& neighbourhood) const;
 
@@ -77,8 +66,6 @@ class ParticipantCheck {
   /// gone.
   std::map<std::uint32_t, Library> libraries_;
   std::map<bus::PeerId, std::string> refused_libraries_;  // of clients that are not admitted
-  /// Pairs that answered the same step; when.
-  std::map<std::pair<bus::PeerId, bus::PeerId>, sync::Time> rivals_;
 };
 
 }  // namespace sls::sim

@@ -66,12 +66,12 @@ bool ParticipantWatch::is_look_due(const Surroundings& around, sync::Time now) c
 void ParticipantWatch::look(Surroundings& around, sync::Time now) {
   look_time_ = now;
   looked_at_version_ = around.members_version();
-  Neighbourhood neighbourhood = around.look(report_.has_published());
+  Neighbourhood neighbourhood = around.find_neighbours();
   neighbourhood.now = now;
+  neighbourhood.is_on_network = !around.stays_on_this_machine();
   neighbourhood.stamps_ahead_s = stamps_.take();
   report_.problem = around.replace_problems(check_.look(neighbourhood));
   problems_version_ = around.problems_version();
-  for (const std::string& event : check_.answers().take_events()) report_.announce(event, now);
 }
 
 void ParticipantWatch::report_silent_recorder(sync::Time now) {

@@ -13,7 +13,7 @@
 namespace sls::sim {
 
 /// Whether the recorders allow a step to be published, and what a run does if they do not for long.
-/// Rules: docs/synchronisation.md, "Recorders".
+/// Rules: docs/synchronisation.md, "Recording" and "Waiting for participants".
 class RecorderWait {
  public:
   RecorderWait(const config::Sync& sync, RunReport& report) : sync_(sync), report_(report) {}

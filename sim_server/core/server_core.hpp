@@ -16,6 +16,31 @@ namespace sls::sim {
 /// is driven: a function for each kind of event, with the time, and `next_deadline` says when
 /// `on_time` must be called without an event. It reads no clock, has no thread, and never throws:
 /// an error ends the run. Rules: docs/synchronisation.md.
+///
+/// One step, k. x are the states of the plants and their measurements, u the forces that act over
+/// [k, k + 1). x⁻ is not published yet, x* is published and awaits answers, x⁺ ends the period.
+///
+///     go_on(now):                               // after each event and at each deadline
+///       if between steps:                       // x⁻(k)
+///         publish_if_allowed(now)
+///       else if awaiting answers and pacing.close(now):
+///         finish_step(now)
+///
+///     publish_if_allowed(now):
+///       return unless the operator, the recorders and the schedule allow step k
+///       x*(k) ← x⁻(k)                           // Outputs::send_states
+///
+///     pacing.close(now):                        // LockstepPacing, RealtimePacing
+///       take the accepted answers to x*(k)
+///       where one is missing: resend x*(k), pass over a silent client, hold u, or fail safe
+///       return true if every vehicle has its u(k)
+///
+///     finish_step(now):
+///       if all answers say that the mission is finished: end the run  // u(k) does not act
+///       record x*(k), u(k)
+///       x⁺(k) ← x*(k) moved by u(k) over one period                   // Fleet::advance
+///       k ← k + 1, x⁻(k) ← x⁺(k − 1)
+///       publish_if_allowed(now)
 class ServerCore {
  public:
   struct Start {

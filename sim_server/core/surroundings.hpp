@@ -24,11 +24,7 @@ struct Neighbourhood {
   bool is_on_network = false;
   /// Participants with a matched writer of sls/command, as text.
   std::map<bus::PeerId, std::string> command_writers;
-  /// Participants with a matched writer of sls/participant: an announcement may still come.
-  std::set<bus::PeerId> announcement_writers;
   std::set<bus::PeerId> state_readers;  ///< participants with a matched reader of sls/state
-  /// Participants that have acknowledged the parameters and a status of this run.
-  std::set<bus::PeerId> informed;
   /// Participants whose commands carry a source timestamp in the future: how far ahead of our
   /// clock, s.
   std::map<bus::PeerId, double> stamps_ahead_s;
@@ -53,9 +49,9 @@ struct Neighbourhood {
   }
 };
 
-/// Removes those whose reader of sls/state is not among `readers`, whom our writer knows, or whose
-/// writer of sls/command is not among `writers`, whom our reader knows: no state reaches them yet,
-/// or no answer us. A client says that it is ready when it sees the server, which may be earlier.
+/// Removes controllers that are not matched in both directions: our writer of sls/state knows the
+/// participants `readers`, our reader of sls/command the participants `writers`. A client announces
+/// that it is ready when it sees the server, which may be earlier.
 inline void keep_matched(std::vector<sync::Member>& controllers,
                          const std::set<bus::PeerId>& readers,
                          const std::set<bus::PeerId>& writers) {
@@ -87,9 +83,8 @@ class Surroundings {
 
   /// Changes when the middleware finds a mistake of a participant, or one ends.
   virtual std::uint64_t problems_version() const = 0;
-  /// The participants and endpoints for ParticipantCheck, without time and stamps of commands.
-  /// `is_known`: participants may have joined the run.
-  virtual Neighbourhood look(bool is_known) = 0;
+  /// The participants and endpoints for ParticipantCheck; ParticipantWatch adds the rest.
+  virtual Neighbourhood find_neighbours() = 0;
   /// Makes `found`, texts by key, the mistakes of this run. Returns all that hold, in words.
   virtual std::string replace_problems(const std::map<std::string, std::string>& found) = 0;
   /// The causes that may keep participants from being discovered, to be appended to a message; else

@@ -76,6 +76,13 @@ class ArchitectureTest(unittest.TestCase):
         self.assertEqual(missing, [])
         self.assertGreater(len(names), 20)
 
+    def test_the_design_has_its_sections_and_an_example_that_is_tested(self):
+        design = read("docs/design.md")
+        self.assertEqual(re.findall(r"^## (\d+)\. ", design, re.MULTILINE), [str(number) for number in range(1, 14)])
+        example = re.search(r"^    name: figure_eight\n(?:    .+\n)+", design, re.MULTILINE)[0]
+        tested = read("tests/common/config/scenario_test.cpp")
+        self.assertIn(re.sub(r"^    ", "", example, flags=re.MULTILINE), tested)
+
     def test_the_readme_is_short_and_its_picture_small(self):
         self.assertLessEqual(len(read("README.md").splitlines()), 150)
         self.assertLess((ROOT / "docs/pictures/live.png").stat().st_size, 300_000)

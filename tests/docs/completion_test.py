@@ -4,6 +4,7 @@ import os
 import pathlib
 import pty
 import select
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -11,7 +12,9 @@ import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "python"))
+sys.path[:0] = [str(ROOT / "python"), str(ROOT / "tests/launcher")]
+import checkout  # noqa: E402
+from sls.launcher import completion  # noqa: E402
 from sls.launcher.commands import COMMANDS  # noqa: E402
 
 FILE = ROOT / "tools/completion/sls.bash"
@@ -42,6 +45,10 @@ class Completion(unittest.TestCase):
         self.assertEqual(set(complete("./sls", "")), set(COMMANDS))
         self.assertEqual(complete("./sls", "ru"), ["run"])
 
+    def test_names_only_commands_that_are_there(self):
+        for commands in (completion.NAMES, completion.FOLDERS, completion.SUBCOMMANDS):
+            self.assertEqual(set(commands) - set(COMMANDS), set())
+
     def test_offers_scenarios(self):
         self.assertLessEqual(list_names("scenarios"), set(complete("./sls", "run", "")))
         self.assertEqual(complete("./sls", "run", "figure_eight_"), ["figure_eight_pid"])
@@ -56,6 +63,11 @@ class Completion(unittest.TestCase):
         self.assertEqual(complete("./sls", "run", "--mo"), ["--mode"])
         self.assertEqual(complete("./sls", "run", "--mode", ""), ["lockstep", "realtime"])
         self.assertEqual(complete("./sls", "run", "--domain", ""), [])
+        self.assertEqual(complete("./sls", "run", "--force", "figure_eight_"), ["figure_eight_pid"])
+        self.assertEqual(complete("./sls", "plot", "--format", "g"), ["gazebo"])
+        self.assertEqual(complete("./sls", "fuzz", "--target", "w"), ["web"])
+        self.assertEqual(complete("./sls", "view", "--log-level", "d"), ["debug"])
+        self.assertEqual(complete("./sls", "campaign", "--on", "l"), ["local"])
         self.assertIn("--watch", complete("./sls", "ctl", "status", "--"))
         self.assertEqual(complete("./sls", "ctl", "pau"), ["pause"])
 
@@ -65,14 +77,29 @@ class Completion(unittest.TestCase):
 
     def test_offers_what_an_installed_launcher_finds(self):
         with tempfile.TemporaryDirectory() as folder:
-            launcher = pathlib.Path(folder) / "bin/sls"
-            scenarios = pathlib.Path(folder) / "share/sls/config/scenarios"
-            launcher.parent.mkdir()
-            launcher.write_text("#!/bin/sh\n")
-            launcher.chmod(0o755)
-            scenarios.mkdir(parents=True)
-            (scenarios / "installed_one.yaml").touch()
-            self.assertEqual(complete(launcher, "run", "installed", folder=folder), ["installed_one"])
+            root = pathlib.Path(folder) / "share/sls"
+            for name in ("sls", "python/sls/__init__.py", "python/sls/launcher"):
+                checkout.copy(name, root)
+            (root / "config/scenarios").mkdir(parents=True)
+            (root / "config/scenarios/installed_one.yaml").touch()
+            self.assertEqual(complete(root / "sls", "run", "installed", folder=folder), ["installed_one"])
+            self.assertEqual(complete(root / "sls", "run", "--mo"), [])
+            page = root.parent / "doc/sls/docs/reference/commands.md"
+            page.parent.mkdir(parents=True)
+            shutil.copy(ROOT / "docs/reference/commands.md", page)
+            self.assertEqual(complete(root / "sls", "run", "--mo"), ["--mode"])
+
+    def test_answers_at_once_and_builds_and_installs_nothing(self):
+        def complete_run():
+            began = os.times()
+            self.assertEqual(complete("./sls", "run", "--mo"), ["--mode"])
+            ended = os.times()
+            return ended.children_user + ended.children_system - began.children_user - began.children_system
+
+        self.assertLess(min(complete_run() for _ in range(3)), 0.3)  # s of the processor
+        done = subprocess.run([ROOT / "sls", "--no-install", "@complete", "ctl", "--log-level", ""], cwd=ROOT, text=True,
+                              capture_output=True, env={**os.environ, "PATH": "/nowhere:/usr/bin:/bin"}, check=True)
+        self.assertEqual((done.stdout.split(), done.stderr), (["debug", "info", "warning", "error"], ""))
 
     def test_is_used_by_an_interactive_bash(self):
         typed = f"source {FILE}\n./sls discovery-s\tX\n"

@@ -239,7 +239,6 @@ class ForeignClient {
 
   void answer() {
     const std::uint64_t step = states_.step();
-    const double time_s = static_cast<double>(states_.sim_time_ns()) * 1e-9;
     const VehicleState& state = states_.vehicles().front();
     const VehicleParameters& vehicle = parameters_->vehicles().front();
     if (step == 0) start_m_ = state.measured().p_WL_m();
@@ -250,15 +249,7 @@ class ForeignClient {
     command.f_Q_W_n({0.0, 0.0, -mass * vehicle.gravity_m_s2()});
     command.reference().position_m(start_m_);
     command.reference().stage_name("hang");
-    ControllerState memory = state.controller();
-    // The first stage of the test's scenario lasts half a second.
-    if (memory.stage_index() == 0 && time_s >= 0.5) {
-      memory.stage_index(1);
-      memory.stage_start_step(step);
-    }
-    command.reference().stage_index(memory.stage_index());
-    if (makes("memory_lost") && time_s >= 1.0) memory = ControllerState();
-    command.controller(memory);
+    command.controller(state.controller());
     command.mission(MissionPhase::MISSION_RUNNING);
 
     Commands answers;
@@ -269,7 +260,6 @@ class ForeignClient {
     write_sample(*command_writer_, &answers);
     for (const char* mistake : {"extra_field", "missing_field", "retyped_field"})
       if (makes(mistake)) say_that_it_begins();
-    if (makes("memory_lost") && time_s >= 1.0) say_that_it_begins();
   }
 
   const Options options_;

@@ -176,13 +176,22 @@ class BuildTest(unittest.TestCase):
         self.assertIn("cmake --preset release", self.expect_flight("header"))
         self.expect_not_built("header")
 
-    def test_a_long_build_says_how_far_it_is(self):
-        stand_in = self.folder / "bin/cmake"
-        real = stand_in.read_text()
-        stand_in.write_text(real.replace("exec ", '[ "$1" = --preset ] || { echo "[5/20] one"; sleep 16; '
-                                         'echo "[10/20] two"; }\nexec '))
-        done, _ = self.launch()
-        self.assertRegex(done.stderr, r"sls: built 10 of 20 files; about \d+ s left\n")
+    def test_a_long_build_says_how_far_it_is_by_the_lines_of_its_files_once_a_tenth_is_done(self):
+        self.write("compiler", '#!/bin/sh\ncase "$*" in *closed_loop*) sleep 18 ;; esac\nexec "$@"\n')
+        (self.root / "compiler").chmod(0o755)
+        self.write("CMakeLists.txt", CMAKE + """add_executable(long long.c)
+set_target_properties(${programs} long PROPERTIES C_COMPILER_LAUNCHER ${CMAKE_SOURCE_DIR}/compiler)
+add_dependencies(closed_loop sim_server control_client recorder)
+add_dependencies(long closed_loop)
+add_dependencies(flight long)
+""")
+        for lines, expected in ((100_000, r"(sls: built 9 of 10 files; about 0 s left\n)?"),
+                                (1, r"sls: built [4-7] of 10 files; about \d+ s left\n")):
+            self.write("long.c", MAIN + "\n" * lines)
+            self.write("text.h", f'#define TEXT "{lines}"\n')
+            done, _ = self.launch()
+            self.assertRegex("".join(re.findall(r"sls: built .*\n", done.stderr)), f"^{expected}$")
+            self.assertRegex(done.stderr, r"sls: \S+/build: configured in \d+ s, compiled in \d+ s\n")
 
     def test_a_tree_that_was_made_with_make_or_copied_is_made_anew(self):
         subprocess.run(["cmake", "-G", "Unix Makefiles", "-S", self.root, "-B", self.root / "build"], check=True,

@@ -120,6 +120,16 @@ class SetupTest(unittest.TestCase):
         self.assertIn("error: apt-get: dpkg was interrupted, you must manually run 'dpkg --configure -a'", said)
         self.assertEqual(len(said.splitlines()), 2, said)
 
+    def test_a_node_that_is_too_old_or_broken_is_one_line(self):
+        (self.root / "tools/view/page").mkdir(parents=True)
+        for action, got in (("echo v16.20.2", "node: expected version 18 or later, got v16.20.2"),
+                            ("echo 'node: not for this machine'", "node: expected version 18 or later, got node: not for this "
+                                                                  "machine"),
+                            ("exit 127", "node --version failed")):
+            self.stand_in("node", action)
+            code, said, _ = self.launch(BOOKWORM, "setup", "--no-install")
+            self.assertEqual((code, said), (1, f"sls: error: {got}\n"))
+
     def test_npm_without_a_network_is_one_line_with_the_reason(self):
         page = self.root / "tools/view/page"
         page.mkdir(parents=True)

@@ -6,9 +6,7 @@
 
 namespace sls::test {
 
-Profile::Profile(const Network& network, const std::string& name,
-                 const std::vector<std::string>& key_options)
-    : network_(network) {
+Profile::Profile(const Network& network, const std::string& name) : network_(network) {
   if (name == "unicast" || name == "wifi" || name == "secure") {
     std::string peers;
     for (const char* host : {"server", "controller", "recorder"})
@@ -23,7 +21,7 @@ Profile::Profile(const Network& network, const std::string& name,
         Words{SLS_SOURCE_DIR "/sls", "discovery-server", "--listen", address});
   } else if (name == "secure") {
     const std::string keys = folder_ / "keys";
-    expect_exit(Words{SLS_SOURCE_DIR "/config/security/keys.sh", keys} + key_options);
+    expect_exit({SLS_SOURCE_DIR "/config/security/keys.sh", keys});
     environment_.push_back("SLS_KEYS=" + keys);
   }
   options_.qos_file = qos(name);

@@ -36,9 +36,7 @@ class HostsTest : public testing::Test {
 class Profile {
  public:
   /// Starts the discovery server if the profile needs one, and makes keys.
-  /// `key_options`: of `./sls keys`.
-  Profile(const Network& network, const std::string& name,
-          const std::vector<std::string>& key_options = {});
+  Profile(const Network& network, const std::string& name);
   ~Profile();
   Profile(const Profile&) = delete;
   Profile& operator=(const Profile&) = delete;

@@ -85,7 +85,7 @@ class Shell : public Outputs, public Surroundings, public Backlog {
   bool stays_on_this_machine() const override { return true; }
   bool has_heard_every_claim() const override { return true; }
   std::uint64_t problems_version() const override { return 0; }
-  Neighbourhood look(bool) override { return {}; }
+  Neighbourhood find_neighbours() override { return {}; }
   std::string replace_problems(const std::map<std::string, std::string>&) override { return ""; }
   std::string describe_isolation() const override { return ""; }
   Queues queues() const override { return {0, 10'000, 0}; }

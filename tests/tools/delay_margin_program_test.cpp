@@ -53,10 +53,12 @@ TEST(DelayMarginProgramTest, MistakesGiveOneLineAndExitCodeTwo) {
                  "--period-s");
   expect_refused(program_with({"--scenario", scenario("short"), "--vehicle", "1"}), 2,
                  "--vehicle: expected one of short, 0 to 0, got 1");
-  expect_refused(
-      program_with({"--scenario", std::string(SLS_SOURCE_DIR) +
-                                      "/tests/common/config/invalid/delay_negative.yaml"}),
-      2, "delay_negative.yaml:7: faults[0].delay.by_s: expected >= 0, got -0.02");
+  const TemporaryFolder folder;
+  const std::string file = folder / "negative.yaml";
+  write_bytes(file,
+              "faults: [{ delay: { on: command, by_s: -0.02 } }]\n" + read_file(scenario("short")));
+  expect_refused(program_with({"--scenario", file}), 2,
+                 "negative.yaml:1: faults[0].delay.by_s: expected >= 0, got -0.02");
 }
 
 TEST(DelayMarginProgramTest, AScenarioThatLosesTheLoadAnywayEndsWithOne) {

@@ -1,10 +1,9 @@
-"""Makes docs/reference, the man pages and the completion from the code's own tables: ./sls reference."""
+"""Makes docs/reference and the man pages from the code's own tables: ./sls reference."""
 
 import argparse
 import pathlib
 import sys
 
-import completion
 import man
 import pages
 import sources
@@ -13,14 +12,6 @@ import sources
 def write(path, text):
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(text, encoding="utf-8")
-
-
-def make_checked_in(build):
-    """{path: text} of every generated file that is checked in."""
-    made = {sources.ROOT / "docs/reference" / name: make(build) for name, make in pages.PAGES.items()}
-    commands = made[sources.ROOT / "docs/reference/commands.md"]
-    made[sources.ROOT / "tools/completion/sls.bash"] = completion.make(commands, sources.load_programs(build))
-    return made
 
 
 def main():
@@ -36,7 +27,8 @@ def main():
             for name, text in man.make(build).items():
                 write(arguments.man / name, text)
             return 0
-        stale = [(path, text) for path, text in make_checked_in(build).items()
+        made = {sources.ROOT / "docs/reference" / name: make(build) for name, make in pages.PAGES.items()}
+        stale = [(path, text) for path, text in made.items()
                  if not path.is_file() or path.read_text(encoding="utf-8") != text]
     except sources.StaleReference as error:
         print(f"sls: error: {error}", file=sys.stderr)

@@ -1,11 +1,14 @@
 """Compiles what sees Fast DDS against version 3 on a machine that has version 2: part of .ci/run.
 
-Headers, CMake files and the code generator come from Debian 13's packages, unpacked in a folder of the build and kept
+Headers, CMake files and the code generator come from Debian 13's packages, unpacked in the cache of the user and kept
 there. CMake configures a second build tree with them, so it chooses the files and options itself. Nothing is linked or
-run: the libraries need Debian 13's C library. Needs the network once, no root."""
+run: the libraries need Debian 13's C library. Needs the network once, no root. Beside the packages stands the stamp of
+the last check that passed: if the same files would be compiled with the same options, nothing is."""
 
 import argparse
+import hashlib
 import json
+import os
 import pathlib
 import re
 import shutil
@@ -88,15 +91,13 @@ def unpack(folder):
     return unpacked
 
 
-def configure(folder, unpacked):
-    """Configures folder/build with the unpacked packages. Returns it."""
-    build = folder / "build"
+def configure(build, unpacked):
+    """Configures a build tree with the unpacked packages."""
     places = {f"{path.name}_DIR": path for path in (unpacked / "usr/lib").glob("*/cmake/*")}
     flags = [f"-D{name}={path}" for name, path in places.items()]
     run(["cmake", "-G", "Ninja", "-S", tree.ROOT, "-B", build, "-DSLS_FASTDDS=3", "-DCMAKE_BUILD_TYPE=Release",
          "-DCMAKE_UNITY_BUILD=ON",
          "-DCMAKE_CXX_FLAGS_RELEASE=-O0", f"-DFASTDDSGEN={unpacked}/usr/bin/fastddsgen", *flags], "cmake")
-    return build
 
 
 def list_objects(build):
@@ -127,20 +128,48 @@ def check_headers(build, objects):
         raise tree.Failure(f"{found[0][0]}: expected headers of Fast DDS 3, got {found[0][1]}")
 
 
+def list_read(build, objects):
+    """The files of this checkout that the objects are made of."""
+    said = run(["ninja", "-C", build, "-t", "deps", *objects], "ninja")
+    sources = {os.path.normpath(build / line) for line in re.findall(r"^    (\S+)$", said, re.MULTILINE)}
+    names = {os.path.relpath(source, tree.ROOT) for source in sources}
+    idl = {str(file.relative_to(tree.ROOT)) for file in (tree.ROOT / "idl").rglob("*") if file.is_file()}
+    return sorted(idl | {name for name in names if not name.startswith(("..", "build"))})
+
+
+def calc_stamp(build, objects, files):
+    """SHA-256 of the compile commands and of what the files hold."""
+    commands = sorted(f"{entry['command']} {list_sources(entry['file'])}" for entry in json.loads(
+        (build / "compile_commands.json").read_text(encoding="utf-8")) if any(name in entry["command"] for name in objects))
+    said = hashlib.sha256("\n".join(commands).replace(str(tree.ROOT), "").encode())
+    for file in files:
+        path = tree.ROOT / file
+        said.update(file.encode() + (path.read_bytes() if path.is_file() else b"missing"))
+    return said.hexdigest()
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--folder", type=pathlib.Path, default=tree.ROOT / "build/fastdds3", metavar="DIR",
-                        help="where packages and objects are kept (default: build/fastdds3)")
+    parser.add_argument("--folder", type=pathlib.Path, metavar="DIR",
+                        default=pathlib.Path(os.environ.get("XDG_CACHE_HOME") or "~/.cache").expanduser() / "sls/fastdds3",
+                        help="where packages and stamp are kept (default: ~/.cache/sls/fastdds3)")
     parser.add_argument("--jobs", type=int, metavar="N", help="compilers at once (default: one more than processors)")
     arguments = parser.parse_args()
     folder = arguments.folder.absolute()
     folder.mkdir(parents=True, exist_ok=True)
+    build, stamp = tree.ROOT / "build/fastdds3", folder / "passed.json"
     try:
-        build = configure(folder, unpack(folder))
+        configure(build, unpack(folder))
         found = dict(sorted(list_objects(build)))
         objects = list(found)
+        passed = json.loads(stamp.read_text(encoding="utf-8")) if stamp.is_file() else {"files": [], "stamp": ""}
+        if passed["stamp"] == calc_stamp(build, objects, passed["files"]):
+            print(f"{sum(found.values())} files compile with Fast DDS 3: none has changed since this check passed")
+            return 0
         run(["ninja", "-C", build, "-k", "0", *(["-j", arguments.jobs] if arguments.jobs else []), *objects], "compiling")
         check_headers(build, objects)
+        files = list_read(build, objects)
+        stamp.write_text(json.dumps({"files": files, "stamp": calc_stamp(build, objects, files)}), encoding="utf-8")
     except tree.Failure as failure:
         print(f"fastdds3_check: error: {failure}", file=sys.stderr)
         return 1

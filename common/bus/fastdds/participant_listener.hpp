@@ -9,11 +9,11 @@
 
 #include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
-#include "common/bus/fastdds/older_peers.hpp"
+#include "common/bus/fastdds/plain_announcements.hpp"
 #include "common/bus/fastdds/refusals.hpp"
 #include "common/config/yaml_node.hpp"
 #include "fastdds_discovery.hpp"
-#include "fastdds_older_peers.hpp"
+#include "fastdds_plain_announcements.hpp"
 
 namespace sls::bus {
 
@@ -25,12 +25,9 @@ class ParticipantListener : public DiscoveryListener {
   /// About the participant that this object listens to.
   struct Own {
     bool is_secured = false;
-    /// Its keys do not protect submessages, so that other vendors' readers get nothing (README.md,
-    /// trap 28).
-    bool has_plain_submessages = false;
-    /// Its keys protect discovery, so that versions of Fast DDS before and since 2.13 do not
-    /// discover each other, nor the later ones Cyclone DDS (README.md, trap 38).
-    bool has_protected_discovery = false;
+    /// Its keys are not for other vendors: their readers get nothing (README.md, trap 28), and Fast
+    /// DDS 3 does not discover Cyclone DDS (trap 38).
+    bool is_for_fastdds_alone = false;
   };
 
   explicit ParticipantListener(const Own& own, Neighbours* neighbours = nullptr,
@@ -88,11 +85,8 @@ class ParticipantListener : public DiscoveryListener {
     if (!other.is_secured) Refusals::of_process().note_refused(to_text(guid), kNoIdentity);
     if (!other.version.empty())
       judge_version(to_text(guid), other.version);
-    else if (own_.has_protected_discovery && !other.as_secure.empty())
-      Refusals::of_process().note_refused(
-          to_text(guid),
-          "another vendor's DDS: expected keys of ./sls keys DIR --other-vendors --mixed-versions, "
-          "got keys without them");
+    else if (own_.is_for_fastdds_alone && !other.as_secure.empty())
+      Refusals::of_process().note_refused(to_text(guid), kOtherVendor);
   }
 
   void on_endpoint(const EndpointNews& news) override {
@@ -115,6 +109,8 @@ class ParticipantListener : public DiscoveryListener {
  private:
   static constexpr const char* kNoIdentity =
       "it has no identity (its QoS file is not config/qos/secure.xml)";
+  static constexpr const char* kOtherVendor =
+      "another vendor's DDS: expected keys of ./sls keys DIR --other-vendors, got keys without it";
 
   template <class Value>
   static std::string to_text(const Value& value) {
@@ -133,20 +129,17 @@ class ParticipantListener : public DiscoveryListener {
 
   /// Reports a participant of a version with which ours does not discover anything.
   void judge_version(const std::string& guid, const std::string& version) const {
-    if (own_.has_protected_discovery &&
+    if (own_.is_secured &&
         has_secure_announcements(version) != has_secure_announcements(kMiddlewareVersion))
       Refusals::of_process().note_refused(
           guid, "its Fast DDS is " + config::to_printable(version, 20) + ", this one " +
-                    kMiddlewareVersion +
-                    ": expected keys of ./sls keys DIR --mixed-versions, got keys without it");
+                    kMiddlewareVersion + ": expected one version in a secured flight");
   }
 
   /// Why it gets no samples of ours although both are authorised; empty if there is no reason.
   std::string find_obstacle(const ParticipantNews& news) const {
-    return own_.has_plain_submessages && news.vendor != rtps::c_VendorId_eProsima
-               ? "another vendor's DDS: expected keys of ./sls keys DIR --other-vendors, got keys "
-                 "without it"
-               : "";
+    return own_.is_for_fastdds_alone && news.vendor != rtps::c_VendorId_eProsima ? kOtherVendor
+                                                                                 : "";
   }
 
   /// The first IPv4 address at which it receives discovery data; empty if it has none.

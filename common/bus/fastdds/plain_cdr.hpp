@@ -135,7 +135,7 @@ class Writer {
     static_assert(sizeof value == 4, "an enumeration of the contract has four bytes");
     write(&value, 4, 4);
   }
-  /// Numbers and arrays of them: there is no padding but before the first.
+  /// Numbers and arrays of them: there is padding only before the first.
   template <class... Doubles>
   void doubles(const Doubles&... fields) {
     static_assert((kIsDoubles<Doubles> && ...));

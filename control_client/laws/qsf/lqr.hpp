@@ -13,7 +13,7 @@ namespace sls::control {
 /// equation could not be solved.
 Eigen::VectorXd calc_lqr_chain_gains(int order, double weight);
 
-/// Solution P of AᵀP + PA − P b bᵀ P + Q = 0 that makes A − b bᵀP stable.
+/// Solution P of AᵀP + PA − P b bᵀ P + Q = 0 that makes A − b bᵀP stable. Q is positive definite.
 /// @throws std::domain_error if there is none.
 Eigen::MatrixXd solve_riccati(const Eigen::MatrixXd& A, const Eigen::VectorXd& b,
                               const Eigen::MatrixXd& Q);

@@ -31,7 +31,7 @@ class SlackRule {
     return released_ ? *released_ + 1 : model::SharedLoad::kTaut + 1;
   }
 
-  /// True where the law must not fly: the cable is slack, or the load hangs more than 60° aside.
+  /// True where the law must not fly: the cable is slack, or the load hangs over 60° to the side.
   bool applies(const model::Measurement& state) const;
 
   /// f_Q_W (N), at most √5 m g, and never downwards.

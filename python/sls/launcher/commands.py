@@ -8,10 +8,11 @@ from collections.abc import Callable
 from typing import NoReturn
 
 from sls import __version__
-from sls.launcher import building, flights
+from sls.launcher import building, completion, flights
 from sls.launcher.arguments import POSITIVE, Parser, filled, make_unknown_option, one_of, whole
 from sls.launcher.building import (FLYING, PROGRAMS, PYTHON, build_programs, call_script, is_help_asked, replace_by,
                                    replace_by_module, replace_by_program)
+from sls.launcher.completion import CONTROLS, FLOWN
 from sls.launcher.docker_demo import docker_demo
 from sls.launcher.fuzzing import fuzz
 from sls.launcher.listing import print_list
@@ -56,8 +57,7 @@ Development
   bench                   measure speed, each figure beside its bound
   chaos                   stop, kill and restart processes of flights at random
   fuzz                    feed mutated input to readers of files and samples
-  reference               write docs/reference and the bash completion
-  docs                    build API pages: build/docs/index.html
+  reference               write docs/reference
   package                 build a Debian package: build/package/
   systems [NAME…]         run the two commands in clean Debian systems
   setup | build | clean   install packages | build programs | remove them
@@ -72,8 +72,7 @@ exit codes: 0 done; 1 the run or a test failed; 2 bad usage or configuration;
 # Commands whose options a program or another Python module reads.
 FOREIGN = ("view", "ctl", "verify", "convert", "plot", "report", "study", "campaign", "campaign-worker", "doctor",
            "bench", "worlds", "check", "network-table", "chaos", "reference", "systems")
-CONTROLS = ("pause", "step", "resume", "start", "reset", "stop", "status")
-SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "docs", "fuzz", "network-table",
+SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "fuzz", "network-table",
                    "package", "reference", "setup", "study", "systems", "test")
 
 
@@ -85,7 +84,11 @@ def set_up(words: list[str]) -> int:
 
 def build(words: list[str]) -> int:
     Parser("build", "", "Sets up and builds; the programs are in build/bin.").parse(words)
-    has_yaml = importlib.util.find_spec("yaml") is not None  # without it no man page can be made
+    try:
+        import yaml  # noqa: F401
+        has_yaml = True
+    except Exception:  # missing or broken: then no man page can be made
+        has_yaml = False
     build_programs(*PROGRAMS, "_sls_core", *(["man_pages"] if has_yaml else []))
     say(f"programs in build/bin: {' '.join(PROGRAMS)}; the module of the package sls in build/python"
         + (", the man pages in build/man" if has_yaml else ""))
@@ -120,9 +123,7 @@ def bench(words: list[str]) -> NoReturn:
     if not is_help_asked(words):
         if not IS_BUILT_ELSEWHERE:
             call_script("@setup", "bench_packages")
-            call_script("@npm", ROOT / "tests/tools/view")
-        build_programs(*FLYING, "sim_ctl", "sls_view", "sls_bench_probe", "sls_bench_spinning_probe",
-                       "sls_microbench", "slow_clock", "view_foxglove_publisher")
+        build_programs(*FLYING, "sls_bench_probe", "sls_microbench", "slow_clock")
     replace_by_module("bench", "--build", BUILD, *words, paths=[str(ROOT)])
 
 
@@ -162,7 +163,7 @@ def study(words: list[str]) -> NoReturn:
 
 
 def campaign(words: list[str]) -> NoReturn:
-    targets = [] if words[:1] in (["status"], ["report"], ["compare"]) else ["_sls_core"]
+    targets = [] if words[:1] and words[0] in FLOWN else ["_sls_core"]
     if any(word.startswith("--verify") for word in words):
         targets += [*FLYING, "sls_verify"]
     run_module(words, targets, "sls.campaign", SLS_BUILD=str(BUILD))  # flights over DDS must not build
@@ -213,12 +214,13 @@ def network_table(words: list[str]) -> NoReturn:
 
 def test(words: list[str]) -> NoReturn:
     parser = Parser("test", "[--slow | --sanitize KIND] [--only REGEX]",
-                    "Sets up, builds and runs the tests. build/test.xml has the output of each.")
+                    "Sets up, builds and runs the tests, the unit suites with AddressSanitizer. build/test.xml\n"
+                    "has the output of each.")
     parser.add_argument("--slow", action="store_true",
                         help="also run the tests that take minutes; they need an idle machine")
     parser.add_argument("--sanitize", type=one_of("address", "thread"), metavar="KIND",
-                        help="run only the unit tests, built with a sanitizer: address; or thread, which runs those "
-                             "with several threads")
+                        help="address: run only the unit suites; thread: those with several threads, built with "
+                             "ThreadSanitizer")
     parser.add_argument("--only", type=filled("pattern"), metavar="REGEX",
                         help="run only the tests whose names match")
     options, _ = parser.parse(words)
@@ -229,10 +231,13 @@ def test(words: list[str]) -> NoReturn:
         which += ["--label-regex", "threaded"]
     elif not options.slow:
         which += ["--label-exclude", "slow"]
-    call_script("@setup", "test_packages", "python_packages", "bench_packages", "doc_packages", "package_packages",
-                *(["fuzz_packages"] if preset == "asan" else []))
+    call_script("@setup", "test_packages", "python_packages", "bench_packages", "package_packages",
+                *([] if preset == "tsan" else ["fuzz_packages"]))
     call_script("@npm", ROOT / "tests/tools/view")
-    call_script("@tree", preset, folder, *{"asan": ["test_programs"], "tsan": ["threaded_tests"]}.get(preset, []))
+    if preset != "tsan":  # the unit suites, which run with those of `build`: tests/CMakeLists.txt
+        call_script("@tree", "asan", ROOT / "build-asan", "test_programs")
+    if preset != "asan":
+        call_script("@tree", preset, folder, *(["threaded_tests"] if preset == "tsan" else []))
     # The tests must not get variables that the middleware reads from the environment.
     hidden = [f"--unset={name}" for name in ("ROS_DISCOVERY_SERVER", "FASTRTPS_DEFAULT_PROFILES_FILE",
                                              "FASTDDS_DEFAULT_PROFILES_FILE", "SLS_DOMAIN")]
@@ -247,16 +252,6 @@ def reference(words: list[str]) -> NoReturn:
         call_script("@install", "python_packages")
         build_programs(*PROGRAMS, "_sls_core", "sls_scenario_keys", "network_table", "chaos")
     replace_by(PYTHON, "-B", ROOT / "tools/reference", "--build", BUILD, *words)
-
-
-def docs(words: list[str]) -> int:
-    Parser("docs", "", "Builds API pages of the C++ and C headers and of the Python package:\n"
-                       "build/docs/index.html.").parse(words)
-    call_script("@setup", "doc_packages", "python_packages")
-    build_programs("_sls_core")  # its docstrings are pages, too
-    building.run(ROOT / "docs/api/build.sh", BUILD)
-    say(f"pages: {BUILD}/docs/index.html")
-    return 0
 
 
 def systems(words: list[str]) -> NoReturn:
@@ -306,7 +301,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "verify": start("sls_verify"), "convert": start("sls_convert"), "python": python, "plot": plot, "report": report,
     "study": study, "check": check, "campaign": campaign, "campaign-worker": campaign_worker, "doctor": start("sls_doctor"),
     "keys": keys, "docker-demo": docker_demo, "discovery-server": discovery_server, "network-table": network_table,
-    "fuzz": fuzz, "chaos": start("chaos", "tests"), "test": test, "reference": reference, "docs": docs,
+    "fuzz": fuzz, "chaos": start("chaos", "tests"), "test": test, "reference": reference,
     "systems": systems, "package": package, "clean": clean, "help": show_help,
 }
 
@@ -316,12 +311,11 @@ def check_words(command: str, words: list[str]) -> None:
 
     Commands without a table, and an installed launcher, which builds nothing, leave it to the program; so does `check`,
     which writes a JUnit file for these mistakes, too."""
-    file = ROOT / "tools/completion/sls.bash"
-    if command not in FOREIGN or command == "check" or is_help_asked(words) or not file.is_file():
+    if command not in FOREIGN or command == "check" or is_help_asked(words) or IS_INSTALLED:
         return
-    rows = re.findall(r'^  \["([\w -]+)"\]="(.*)"$', file.read_text(encoding="utf-8"), re.MULTILINE)
-    table = dict(reversed(rows))  # of several rows of a command the first has its options
-    known, others, takes_value = table.get(command, "").split(), [], False
+    known, others, takes_value = completion.read_options(command), [], False
+    if not known:
+        return
     for word in words:
         if word == "--":
             break
@@ -333,7 +327,7 @@ def check_words(command: str, words: list[str]) -> None:
         elif not any(option.startswith(name) for option in known):
             raise make_unknown_option(command, word, known)
         else:
-            takes_value = f"{command} {word}" in table
+            takes_value = bool(known.get(word, ("",))[0])
     if command == "ctl" and others and others[0] not in CONTROLS:
         raise Failure(f"ctl: expected {list_choices(CONTROLS)}, got '{others[0]}'{suggest(others[0], CONTROLS)}", 2)
     if command == "campaign" and len(others) == 1:
@@ -357,6 +351,10 @@ def main(words: list[str]) -> int:
     if command != "python" and "--no-install" in words:  # the options of python are the script's
         building.is_installing = False
         words = [word for word in words if word != "--no-install"]
+    if command == "@complete" and words:
+        kind, names = completion.complete(words, COMMANDS)
+        print(kind, *names, sep="\n")
+        return 0
     if command == "--version":
         print(f"sls {__version__}")
         return 0

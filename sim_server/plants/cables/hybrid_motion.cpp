@@ -473,7 +473,7 @@ std::optional<double> HybridMotion::find_arrival(const Actions& actions, double 
     };
     return find_rise(find, {start, rate}, until, at_end, 1e-2 * tolerance);
   }
-  // Not so the first event of a step: the last bits of recordings depend on its search.
+  // The first event of a step keeps its own search: the last bits of recordings depend on it.
   return find_crossing(violation, 0.0, start, until, at_end);
 }
 

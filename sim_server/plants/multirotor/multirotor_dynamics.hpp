@@ -1,5 +1,6 @@
 /// Accelerations of the body and its pendulum from Simbody's mass properties and orientations.
-/// Source: README.md, eqs. (7) to (12). "Integration" explains why not by Simbody.
+/// Source: README.md, eqs. (7) to (12). "Integration" says why Simbody does
+/// not compute them.
 #pragma once
 
 #include <Simbody.h>

@@ -1,6 +1,6 @@
 /// Accelerations of a quadrotor, a point mass, and its pendulum from Simbody's mass properties and
-/// position kinematics. Source: README.md, eqs. (2) and (3). "Integration" explains why
-/// not by Simbody.
+/// position kinematics. Source: README.md, eqs. (2) and (3). "Integration" says why Simbody
+/// does not compute them.
 #pragma once
 
 #include <Simbody.h>

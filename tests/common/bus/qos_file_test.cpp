@@ -16,6 +16,7 @@
 #include "common/bus/node.hpp"
 #include "common/config/config_error.hpp"
 #include "fastdds_files.hpp"
+#include "tests/support/edited_documents.hpp"
 #include "tests/support/own_domain.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -140,30 +141,7 @@ TEST_F(QosFileTest, EachMisspeltProfileOfOursIsNamed) {
   }
 }
 
-// --- invalid/: one file per defect; the comment after the XML declaration has the message
-
-/// The expected message, without the file's name, from the comment of an invalid file. VERSION in
-/// it is that of Fast DDS.
-std::string read_expectation(const fs::path& file) {
-  const std::string text = sls::test::read_bytes(file);
-  const std::string mark = "<!-- expect: ", end = " -->";
-  const auto begin = text.find(mark);
-  if (begin == std::string::npos) return "no expectation in " + file.string();
-  std::string message =
-      text.substr(begin + mark.size(), text.find(end, begin) - begin - mark.size());
-  const std::string version = "VERSION";
-  if (const auto at = message.find(version); at != std::string::npos)
-    message.replace(at, version.size(), middleware_version());
-  return message;
-}
-
-std::vector<fs::path> list_invalid_files() {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(SLS_SOURCE_DIR "/tests/common/bus/invalid"))
-    if (entry.path().extension() == ".xml") files.push_back(entry.path());
-  std::sort(files.begin(), files.end());
-  return files;
-}
+// --- invalid_qos_files.txt: one row per defect
 
 /// Uses `file` as a program does and ends the process; prints the message and exits with 2 if the
 /// file is refused.
@@ -196,17 +174,24 @@ std::string quote(const std::string& text) {
   return quoted;
 }
 
-TEST(InvalidQosFilesDeathTest, EachFileGivesTheMessageInItsComment) {
+using InvalidQosFilesDeathTest = QosFileTest;
+
+TEST_F(InvalidQosFilesDeathTest, EachRowGivesItsMessage) {
   GTEST_FLAG_SET(death_test_style, "threadsafe");  // profiles are global to a process
-  const auto files = list_invalid_files();
-  EXPECT_GE(files.size(), 8u);
-  for (const fs::path& file : files) {
-    const std::string expected = file.string() + read_expectation(file);
-    const std::string error = find_error(file);
+  const auto files =
+      sls::test::read_edited_documents(SLS_SOURCE_DIR "/tests/common/bus/invalid_qos_files.txt");
+  EXPECT_GE(files.size(), 18u);
+  for (const auto& [place, text, message] : files) {
+    std::string expected = message;
+    if (const auto at = expected.find("VERSION"); at != std::string::npos)
+      expected.replace(at, 7, middleware_version());
+    const std::string error = find_error_in(text);
     if (error != "no error")
-      EXPECT_EQ(error, expected);
-    else  // only Fast DDS reports the error
-      EXPECT_EXIT(use_file_and_exit(file), testing::ExitedWithCode(2), quote(expected));
+      EXPECT_EQ(error, expected) << place;
+    else  // only Fast DDS reports the error; the file is in another folder when the test runs again
+      EXPECT_EXIT(use_file_and_exit(folder_ / "qos.xml"), testing::ExitedWithCode(2),
+                  quote("/qos.xml" + expected))
+          << place;
   }
 }
 

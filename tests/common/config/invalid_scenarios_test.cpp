@@ -8,6 +8,7 @@
 #include <regex>
 
 #include "tests/common/config/support.hpp"
+#include "tests/support/edited_documents.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::config::test {
@@ -37,16 +38,12 @@ class UnusableFileTest : public testing::Test {
   const fs::path folder_ = own_folder_.path();
 };
 
-TEST(InvalidScenariosTest, EachFileGivesTheMessageOnItsFirstLine) {
-  const auto files = list_yaml_files("tests/common/config/invalid");
-  EXPECT_GT(files.size(), 100u);
-  for (const fs::path& file : files) {
-    const std::string text = read_text(file), mark = "# expect: ";
-    ASSERT_EQ(text.compare(0, mark.size(), mark), 0) << file;
-    const auto end_of_line = text.find('\n');
-    const std::string message = text.substr(mark.size(), end_of_line - mark.size());
-    EXPECT_EQ(find_load_error(file), file.string() + ":" + message);
-  }
+TEST(InvalidScenariosTest, EachRowOfTheTableGivesItsMessage) {
+  const auto rows =
+      sls::test::read_edited_documents(SLS_SOURCE_DIR "/tests/common/config/invalid_scenarios.txt");
+  EXPECT_GT(rows.size(), 380u);
+  for (const auto& [place, text, message] : rows)
+    EXPECT_EQ(find_error(text), "file:" + message) << place;
 }
 
 TEST_F(UnusableFileTest, MissingFile) {

@@ -13,75 +13,6 @@ namespace {
 using Eigen::Vector3d;
 using sim::MultirotorKeys;
 
-/// Every key of the plant and of its autopilot `px4`, each with a value that is not its default.
-const char* const kEverything = R"(name: everything
-vehicle: { quad_mass_kg: 1.55, load_mass_kg: 0.15, rod_length_m: 0.9, gravity_m_s2: 9.8066 }
-plant:
-  model: multirotor
-  inertia_kg_m2: [0.029125, 0.0292, 0.055225]
-  inertia_products_kg_m2: [0.0001, -0.0002, 0.0003]
-  rotor:
-    thrust_constant_n_s2: 5.1e-6
-    torque_constant_m: 0.05
-    drag_constant_n_s2_m: 8.0e-5
-    rolling_constant_n_s2: 1.0e-6
-    min_speed_rad_s: 100
-    max_speed_rad_s: 1500
-    lag_up_s: 0.0125
-    lag_down_s: 0.025
-    thrust_loss_speed_m_s: 25
-  rotors:
-    - { position_m: [0.13, 0.22, -0.01], spin: ccw, axis: [0.1, 0, -2] }
-    - position_m: [-0.13, -0.2, 0]
-      spin: cw
-      thrust_constant_n_s2: 5.2e-6
-      torque_constant_m: 0.06
-      drag_constant_n_s2_m: 9.0e-5
-      rolling_constant_n_s2: 2.0e-6
-      min_speed_rad_s: 110
-      max_speed_rad_s: 1600
-      lag_up_s: 0.013
-      lag_down_s: 0.026
-      thrust_loss_speed_m_s: 26
-  bodies:
-    - { mass_kg: 0.03, position_m: [0.01, 0.02, 0.03], inertia_kg_m2: [1.0e-4, 2.0e-4, 2.5e-4] }
-    - { mass_kg: 0.005 }
-  pendulum: rigid
-  attachment_m: [0.01, -0.02, 0.05]
-  rod: { mass_kg: 0.01, centre_m: 0.45, inertia_kg_m2: [8.333e-4, 8.334e-4, 5.0e-5] }
-  load_inertia_kg_m2: [1.0e-9, 2.0e-9, 3.0e-9]
-  wind_m_s: [1, -2, 0.5]
-  disturbance_n: [0.1, 0.2, -0.3]
-  disturbance_torque_n_m: [0.001, -0.002, 0.003]
-  step_s: 0.0005
-  initial:
-    quad_position_m: [1, 2, -3]
-    attitude: [0.8, 0.36, -0.48, 0]
-    body_rates_rad_s: [0.4, -0.5, 0.6]
-autopilot:
-  model: px4
-  period_s: 0.002
-  thrust_map: affine
-  affine_thrust: { force_n: 16, thrust: 0.8, force_per_thrust_n: 21 }
-  attitude: { gains_per_s: [6, 6.1, 2.9], yaw_weight: 0.3, rate_limits_rad_s: [3, 3.1, 3.2] }
-  rates:
-    proportional_per_rad_s: [0.15, 0.16, 0.21]
-    integral_per_rad: [0.2, 0.21, 0.11]
-    derivative_per_rad_s2: [0.003, 0.004, 0.001]
-    integral_limits: [0.3, 0.31, 0.32]
-    integral_off_error_rad_s: 6
-    rate_cut_off_hz: 41
-    derivative_cut_off_hz: 31
-  mixer:
-    - { roll: -0.4, pitch: 0.7, yaw: 0.9, thrust: 0.95 }
-    - { roll: 0.4, pitch: -0.7, yaw: -1 }
-  rotor_speeds: { at_zero_rad_s: 90, per_output_rad_s: 1010 }
-estimator: { tilt_rad: [-0.0118, -0.0046], yaw_rad: 0.055 }
-mission:
-  - hold: { position_m: [1, 2, -3] }
-    for_s: 1
-)";
-
 void expect_rotors(const MultirotorKeys& keys) {
   const sim::RotorNumbers<double>& all = keys.rotor;
   EXPECT_EQ(all.thrust_constant, 5.1e-6);
@@ -181,7 +112,7 @@ void expect_everything(const Scenario& scenario) {
 }
 
 TEST(MultirotorScenarioTest, EveryKeyIsReadAndSurvivesWritingAndReading) {
-  const Scenario scenario = parse_scenario(kEverything, "file");
+  const Scenario scenario = parse_scenario(kEveryMultirotorKey, "file");
   expect_everything(scenario);
   const std::string written = to_yaml(scenario);
   const Scenario again = parse_scenario(written, "written");
@@ -190,9 +121,9 @@ TEST(MultirotorScenarioTest, EveryKeyIsReadAndSurvivesWritingAndReading) {
   EXPECT_EQ(to_yaml(again), written);
 }
 
-/// `kEverything` with its only occurrence of `from` replaced by `to`.
+/// `kEveryMultirotorKey` with its only occurrence of `from` replaced by `to`.
 std::string with(const std::string& from, const std::string& to) {
-  return replace_once(kEverything, from, to);
+  return replace_once(kEveryMultirotorKey, from, to);
 }
 
 TEST(MultirotorScenarioTest, ARoundedQuaternionIsMadeAUnitOne) {
@@ -216,7 +147,7 @@ TEST(MultirotorScenarioTest, UnusualButValidValuesAreAllowed) {
 }
 
 TEST(MultirotorScenarioTest, WithoutAnAutopilotHasNone) {
-  std::string text = kEverything;
+  std::string text = kEveryMultirotorKey;
   const auto first = text.find("autopilot:"), last = text.find("estimator:");
   text.erase(first, last - first);
   const Scenario scenario = parse_scenario(text, "file");

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <filesystem>
-#include <random>
 #include <string>
 #include <vector>
 
@@ -24,11 +23,8 @@ inline Gains gains_of(const Scenario& scenario) {
   return scenario.controller.own.get<QsfKeys>().gains;
 }
 
-/// Equal in every field but `text` and `sha256`.
-bool are_equal(const Scenario& a, const Scenario& b);
-
-/// A valid scenario; equal generators give equal scenarios.
-Scenario make_random_scenario(std::mt19937_64& random);
+/// Equal in every key.
+inline bool are_equal(const Scenario& a, const Scenario& b) { return to_yaml(a) == to_yaml(b); }
 
 /// The message of the ConfigError that `text` (in "file") gives, or "no error".
 std::string find_error(const std::string& text);
@@ -37,6 +33,11 @@ std::string find_error(const std::string& text);
 std::vector<std::filesystem::path> list_yaml_files(const std::string& folder);
 
 std::string read_text(const std::filesystem::path& file);
+
+/// Every key of the plant `slung_load`, then of `multirotor` with the autopilot `px4`, each with a
+/// value that is not its default.
+extern const char* const kEveryKey;
+extern const char* const kEveryMultirotorKey;
 
 /// A short valid scenario, one key per line, in which tests replace parts.
 extern const char* const kMinimalScenario;

@@ -4,12 +4,9 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <random>
 
-#include "tests/oracle/slung_load_ode.hpp"
-#include "tests/sim_server/plants/rigid_pendulum_ode.hpp"
 #include "tests/support/random_vectors.hpp"
 
 namespace sls::oracle::multirotor {
@@ -211,203 +208,7 @@ TEST(MultirotorOdeTest, KeepsMomentumAndEnergyWithoutForces) {
   }
 }
 
-TEST(MultirotorOdeTest, GainsTheEnergyThatItsForcesPutIn) {
-  for (const PendulumModel model : {PendulumModel::kIdeal, PendulumModel::kRigid}) {
-    const Vehicle vehicle = make_vehicle(model);
-    std::mt19937 generator(3);
-    State state = draw_state(generator, 4);
-    Inputs inputs = draw_inputs(generator);
-    const double start = calc_energy(state, vehicle), h = 1e-3;
-    double work = 0.0;  // by Simpson's rule, of the same order as the method
-    for (int i = 0; i < 1000; ++i) {
-      const State middle = step(state, inputs, vehicle, h / 2, 1);
-      const State end = step(middle, inputs, vehicle, h / 2, 1);
-      work += h / 6 *
-              (calc_power(state, inputs, vehicle) + 4.0 * calc_power(middle, inputs, vehicle) +
-               calc_power(end, inputs, vehicle));
-      state = end;
-    }
-    EXPECT_GT(std::abs(work), 5.0);
-    // Large, because Simpson's rule also integrates across the kinks of the loss.
-    EXPECT_NEAR(calc_energy(state, vehicle) - start, work, 1e-6);
-  }
-}
-
-// The body alone.
-
-TEST(MultirotorOdeTest, PrecessesAsAFreeSymmetricTop) {
-  // J = (J_t, J_t, J_a), H constant: R(t) = exp(t [H/J_t]×) R(0) exp(t [e₃]× ω_z (1 − J_a/J_t)).
-  const double J_t = 0.03, J_a = 0.055;
-  Vehicle vehicle = make_bare_vehicle(PendulumModel::kNone, {J_t, J_t, J_a});
-  std::mt19937 generator(4);
-  State state = draw_state(generator, 0);
-  state.w_WB_B << 2.0, -1.0, 3.0;
-  const Vector3d H_W = state.q_WB * (vehicle.body.inertia_B * state.w_WB_B);
-  const double time = 4.0, rate = H_W.norm() / J_t;
-  const Eigen::Quaterniond expected = AngleAxisd(rate * time, H_W.normalized()) * state.q_WB *
-                                      AngleAxisd(3.0 * (1.0 - J_a / J_t) * time, Vector3d::UnitZ());
-  state = step(state, {}, vehicle, time, 8000);
-  EXPECT_LE((state.q_WB.toRotationMatrix() - expected.toRotationMatrix()).norm(), 1e-10);
-  // ω_x + i ω_y turns with (J_a/J_t − 1) ω_z.
-  const double turned = std::atan2(-1.0, 2.0) + (J_a / J_t - 1.0) * 3.0 * time;
-  const Vector3d w(std::sqrt(5.0) * std::cos(turned), std::sqrt(5.0) * std::sin(turned), 3.0);
-  EXPECT_LE((state.w_WB_B - w).norm(), 1e-10);
-}
-
-TEST(MultirotorOdeTest, FlipsAboutItsMiddleAxisWithJacobisPeriod) {
-  // J_1 < J_2 < J_3, H² > 2 E J_2, start at ω_2 = 0: ω_1 ~ cn, ω_2 ~ sn, ω_3 ~ dn with the period
-  // 4 K(k) / p, p² = (J_3 − J_2)(H² − 2 E J_1) / (J_1 J_2 J_3),
-  // k² = (J_2 − J_1)(2 E J_3 − H²) / ((J_3 − J_2)(H² − 2 E J_1)).
-  const Vector3d J(0.03, 0.04, 0.06), w(2.0, 0.0, 1.6);
-  const double H2 = J.cwiseProduct(w).squaredNorm(), E2 = w.dot(J.cwiseProduct(w));
-  ASSERT_GT(H2, E2 * J.y());
-  const double p = std::sqrt((J.z() - J.y()) * (H2 - E2 * J.x()) / (J.x() * J.y() * J.z()));
-  const double k =
-      std::sqrt((J.y() - J.x()) * (E2 * J.z() - H2) / ((J.z() - J.y()) * (H2 - E2 * J.x())));
-  const double half = 2.0 * std::comp_ellint_1(k) / p;
-  const Vehicle vehicle = make_bare_vehicle(PendulumModel::kNone, J);
-  State state;
-  state.w_WB_B = w;
-  const Vector3d H_W = J.cwiseProduct(w);
-  state = step(state, {}, vehicle, half, 4000);
-  EXPECT_LE((state.w_WB_B - Vector3d(-w.x(), 0.0, w.z())).norm(), 1e-10);
-  EXPECT_LE((state.q_WB * J.cwiseProduct(state.w_WB_B) - H_W).norm(), 1e-12);
-  state = step(state, {}, vehicle, half / 2, 2000);
-  EXPECT_NEAR(state.w_WB_B.x(), 0.0, 1e-10);  // cn, a quarter later
-  state = step(state, {}, vehicle, half / 2, 2000);
-  EXPECT_LE((state.w_WB_B - w).norm(), 1e-10);
-  EXPECT_NEAR(state.w_WB_B.dot(J.cwiseProduct(state.w_WB_B)), E2, 1e-13);
-}
-
 // Body and pendulum.
-
-/// Largest difference from the oracle of a point mass in 2 s under a force that changes every 4 ms,
-/// each period in `substeps`.
-template <typename PointMass>
-double calc_difference(const Vehicle& vehicle, const PointMass& parameters, int substeps) {
-  std::mt19937 generator(5);
-  State state = draw_state(generator, 0);
-  state = with_rod(state, state.n_W, state.n_dot_W, 0.0);
-  oracle::State point{state.p_WQ, state.v_WQ, state.n_W, state.n_dot_W};
-  double difference = 0.0;
-  for (int i = 0; i < 500; ++i) {
-    Inputs inputs;
-    inputs.f_Q_W = Vector3d(0.0, 0.0, -18.0) + draw_vector(generator, 5.0);
-    inputs.disturbance_force_W << 0.5, -0.2, 0.1;
-    const Vector3d force = inputs.f_Q_W + inputs.disturbance_force_W;
-    state = step(state, inputs, vehicle, 0.004, substeps);
-    for (int k = 0; k < substeps; ++k) point = rk4_step(point, force, 0.004 / substeps, parameters);
-    difference = std::max({difference, (state.p_WQ - point.p_WQ).norm(),
-                           (state.n_W - point.n_W).norm(), (state.v_WQ - point.v_WQ).norm()});
-  }
-  return difference;
-}
-
-TEST(MultirotorOdeTest, EqualsThePointMassWithItsJointInTheCentre) {
-  Vehicle vehicle = make_bare_vehicle(PendulumModel::kIdeal, {0.03, 0.04, 0.06});
-  vehicle.pendulum.p_QA_B.setZero();
-  model::SlungLoadParameters parameters;
-  parameters.quad_mass = vehicle.body.mass;
-  parameters.load_mass = vehicle.pendulum.load_mass;
-  parameters.rod_length = vehicle.pendulum.load_distance;
-  parameters.gravity = vehicle.gravity;
-  // The same motion for any attitude. The equations differ for |n| ≠ 1, as inside a step: 5e-11 at
-  // 1 ms, 2e-13 at 0.25 ms, with the fourth power of the step.
-  EXPECT_LE(calc_difference(vehicle, parameters, 16), 1e-11);
-}
-
-TEST(MultirotorOdeTest, EqualsTheRigidPendulumWithItsJointInTheCentre) {
-  Vehicle vehicle = make_bare_vehicle(PendulumModel::kRigid, {0.03, 0.04, 0.06});
-  vehicle.pendulum.p_QA_B.setZero();
-  const PendulumMass mass = calc_mass(vehicle.pendulum);
-  RigidPendulum parameters;
-  parameters.quad_mass = vehicle.body.mass;
-  parameters.gravity = vehicle.gravity;
-  parameters.mass = mass.mass;
-  parameters.centre = mass.centre;
-  parameters.inertia = mass.inertia_across;
-  // One oracle integrates a quaternion, the other a direction: 2e-10 at 1 ms, 9e-13 at 0.25 ms.
-  EXPECT_LE(calc_difference(vehicle, parameters, 16), 1e-11);
-}
-
-TEST(MultirotorOdeTest, RigidTendsToIdealWithTheLoadsInertia) {
-  // With a rod without mass, the load's inertia I changes the swing by I / (M L²) to first order.
-  const auto fly = [](PendulumModel model, double inertia) {
-    Vehicle vehicle = make_vehicle(model);
-    vehicle.pendulum.rod_mass = vehicle.pendulum.rod_inertia_across = 0.0;
-    vehicle.pendulum.rod_inertia_along = 0.0;
-    vehicle.pendulum.load_inertia_across = vehicle.pendulum.load_inertia_along = inertia;
-    std::mt19937 generator(6);
-    State state = draw_state(generator, 4);
-    state = with_rod(state, state.n_W, state.n_dot_W, 0.0);
-    state = step(state, draw_inputs(generator), vehicle, 0.5, 500);
-    return calc_load(state, vehicle).p_W;
-  };
-  const Vector3d ideal = fly(PendulumModel::kIdeal, 0.0);
-  const double coarse = (fly(PendulumModel::kRigid, 2e-5) - ideal).norm();
-  const double fine = (fly(PendulumModel::kRigid, 1e-5) - ideal).norm();
-  EXPECT_LE(fine, 1e-3);
-  EXPECT_NEAR(coarse / fine, 2.0, 0.01);
-}
-
-TEST(MultirotorOdeTest, TiltsUntilTheWeightsHangBelowTheForce) {
-  // Under a constant force −(m + M) g e₃ at Q: at rest m c + M a is vertically below Q, T = M g.
-  for (const PendulumModel model : {PendulumModel::kIdeal, PendulumModel::kRigid}) {
-    Vehicle vehicle = make_bare_vehicle(model, {0.03, 0.04, 0.06});
-    vehicle.body.p_QC_B << -0.01, 0.0, 0.005;
-    vehicle.pendulum.p_QA_B << 0.06, 0.0, 0.1;
-    const double m = vehicle.body.mass, M = calc_mass(vehicle.pendulum).mass;
-    const double tilt = -std::atan2(-0.01 * m + 0.06 * M, 0.005 * m + 0.1 * M);
-    State state;
-    state.q_WB = AngleAxisd(tilt, Vector3d::UnitY());
-    Inputs inputs;
-    inputs.f_Q_W << 0.0, 0.0, -(m + M) * vehicle.gravity;
-    const Rate rate = calc_rate(state, inputs, vehicle);
-    EXPECT_LE(rate.a_WQ.norm() + rate.w_WB_B_dot.norm() + rate.n_ddot_W.norm(), 1e-12);
-    EXPECT_NEAR(rate.tension, M * vehicle.gravity, 1e-12);
-    state = step(state, inputs, vehicle, 2.0, 1000);
-    EXPECT_LE(state.p_WQ.norm() + state.w_WB_B.norm() + state.n_dot_W.norm(), 1e-11);
-  }
-}
-
-TEST(MultirotorOdeTest, SwingsInBothModesAtTheirClosedFormFrequencies) {
-  // Body tilt θ and rod angle φ in the plane x, z under a constant hover force at Q. The velocity
-  // of the pendulum's centre relative to the body's is u = (a − c) θ̇ + d φ̇, and
-  // 2 E = J θ̇² + μ u² + I φ̇² + g (m c + M a) θ² + g M d φ².
-  for (const PendulumModel model : {PendulumModel::kIdeal, PendulumModel::kRigid}) {
-    Vehicle vehicle = make_bare_vehicle(model, {0.03, 0.04, 0.06});
-    const double a = 0.12, c = 0.01, m = vehicle.body.mass;
-    vehicle.body.p_QC_B << 0.0, 0.0, c;
-    vehicle.pendulum.p_QA_B << 0.0, 0.0, a;
-    const PendulumMass rod = calc_mass(vehicle.pendulum);
-    const double M = rod.mass, d = rod.centre, mu = m * M / (m + M);
-    const double of_body = 0.04 + mu * (a - c) * (a - c), of_both = mu * (a - c) * d,
-                 of_rod = rod.inertia_across + mu * d * d;
-    const double holds_body = vehicle.gravity * (m * c + M * a),
-                 holds_rod = vehicle.gravity * M * d;
-    // (holds_body − ω² of_body) (holds_rod − ω² of_rod) = (ω² of_both)²
-    const double square = of_body * of_rod - of_both * of_both;
-    const double half = 0.5 * (holds_body * of_rod + holds_rod * of_body);
-    const double root = std::sqrt(half * half - square * holds_body * holds_rod);
-    Inputs inputs;
-    inputs.f_Q_W << 0.0, 0.0, -(m + M) * vehicle.gravity;
-    for (const double omega_2 : {(half - root) / square, (half + root) / square}) {
-      const Eigen::Vector2d shape =
-          1e-5 * Eigen::Vector2d(omega_2 * of_both, holds_body - omega_2 * of_body).normalized();
-      State state;
-      state.q_WB = AngleAxisd(shape(0), Vector3d::UnitY());
-      state = with_rod(state, {std::sin(shape(1)), 0.0, std::cos(shape(1))});
-      const double period = 2.0 * kPi / std::sqrt(omega_2);
-      // On the other side after half a period, back after a whole one. The finite amplitude causes
-      // a relative error of 1e-10.
-      for (const double sign : {-1.0, 1.0}) {
-        state = step(state, inputs, vehicle, period / 2, 2000);
-        EXPECT_NEAR(2.0 * state.q_WB.y(), sign * shape(0), 1e-13);
-        EXPECT_NEAR(state.n_W.x(), sign * shape(1), 1e-13);
-      }
-    }
-  }
-}
 
 TEST(MultirotorOdeTest, PrecessesAsASpinningConicalPendulum) {
   // Joint in the centre, hover force, I' = I + μ d², spin ω₃ along the rod, cone angle θ:
@@ -468,21 +269,6 @@ TEST(MultirotorOdeTest, RotorSpeedsAreExactForAnyStep) {
   EXPECT_NEAR(speed_after(-5.0, 0.01, 3), 100.0 + 400.0 * std::exp(-0.01 / 0.025), 1e-12);
   rotor.lag_up = 0.0;
   EXPECT_EQ(speed_after(900.0, 1e-9, 1), 900.0);
-}
-
-TEST(MultirotorOdeTest, TurnsALaggingRotorIntoMomentum) {
-  // m v = k_f ∫ (w_s + A e^(−t/τ))² dt = k_f (w_s² t + 2 w_s A τ (1 − e) + A² τ / 2 (1 − e²)).
-  Vehicle vehicle = make_single_rotor_vehicle();
-  const double lag = vehicle.rotors[0].lag_up = 0.0125;
-  State state;
-  state.rotor_speeds = {400.0};
-  Inputs inputs;
-  inputs.rotor_set_points = {900.0};
-  const double time = 0.05, A = 400.0 - 900.0, e = std::exp(-time / lag);
-  state = step(state, inputs, vehicle, time, 400);
-  const double impulse = 2e-5 * (900.0 * 900.0 * time + 2.0 * 900.0 * A * lag * (1.0 - e) +
-                                 A * A * lag / 2.0 * (1.0 - e * e));
-  EXPECT_NEAR(state.v_WQ.z(), -impulse / vehicle.body.mass, 1e-10);
 }
 
 TEST(MultirotorOdeTest, RisesAndSinksAsTheThrustLossSays) {
@@ -555,39 +341,6 @@ TEST(MultirotorOdeTest, TurnsTheBodyAsItsRotorsSay) {
              Vector3d(0.0, -1000.0 * 1e-5 * 0.6 / 0.04, 0.0))
                 .norm(),
             1e-12);
-}
-
-TEST(MultirotorOdeTest, HoversLevelWithAnOffsetJoint) {
-  // Front and rear pair at ±l: T_f + T_r = (m + M) g, l (T_f − T_r) = (m c_x + M a_x) g.
-  for (const PendulumModel model : {PendulumModel::kIdeal, PendulumModel::kRigid}) {
-    Vehicle vehicle = make_bare_vehicle(model, {0.03, 0.04, 0.06});
-    vehicle.body.p_QC_B << 0.01, 0.0, 0.0;
-    vehicle.pendulum.p_QA_B << 0.05, 0.0, 0.1;
-    const double l = 0.2, k_f = 5e-6;
-    const double m = vehicle.body.mass, M = calc_mass(vehicle.pendulum).mass;
-    const double sum = (m + M) * vehicle.gravity;
-    const double moment = (0.01 * m + 0.05 * M) * vehicle.gravity;
-    State state;
-    for (const int front : {1, -1})
-      for (const int right : {1, -1}) {
-        Rotor rotor;
-        rotor.p_QR_B << front * l, right * 0.15, -0.03;
-        rotor.spin = front * right;
-        rotor.thrust_constant = k_f;
-        rotor.torque_constant = 0.05;
-        rotor.loss_speed = 25.0;
-        vehicle.rotors.push_back(rotor);
-        state.rotor_speeds.push_back(std::sqrt((sum + front * moment / l) / 4.0 / k_f));
-      }
-    const Rate rate = calc_rate(state, {}, vehicle);
-    EXPECT_LE(rate.a_WQ.norm() + rate.w_WB_B_dot.norm() + rate.n_ddot_W.norm(), 1e-12);
-    EXPECT_NEAR(rate.tension, M * vehicle.gravity, 1e-12);
-    Inputs inputs;
-    inputs.rotor_set_points = state.rotor_speeds;
-    state = step(state, inputs, vehicle, 1.0, 200);
-    // No controller holds the attitude: rounding errors grow, but stay below this.
-    EXPECT_LE(state.p_WQ.norm() + state.v_WQ.norm() + state.w_WB_B.norm(), 1e-11);
-  }
 }
 
 // The method.

@@ -128,7 +128,7 @@ TEST_F(ServersTest, AWriterWithoutAClaimIsAnImpostorAfterAWhile) {
   unclaimed = servers_.look_for_unclaimed(writers, at(10'002));
   EXPECT_EQ(unclaimed.found.size(), 1u);
   EXPECT_EQ(unclaimed.settled, std::vector{kServer});
-  // One that has gone begins anew.
+  // One that has gone begins again.
   servers_.look_for_unclaimed({}, at(10'003));
   EXPECT_TRUE(servers_.look_for_unclaimed(writers, at(10'004)).found.empty());
 }

@@ -15,14 +15,33 @@ from sls.campaign.campaign_file import load_campaign
 from sls.campaign.sampling import make_values
 from sls.input_error import InputError
 
-INVALID = sorted((support.HERE / "invalid").glob("*.yaml"))
 SEEDS = "runs: 3\nseeds: [faults.0.noise.seed]\n"
 
 
-@pytest.mark.parametrize("file", INVALID, ids=lambda file: file.stem)
-def test_refuses_with_file_line_and_key(file):
-    first_line = file.read_bytes().split(b"\n")[0].decode()
-    expected = first_line.removeprefix("# expect: ")
+def read_invalid_campaigns():
+    """(text, message) of each row of invalid_campaigns.txt."""
+    base = lines = ""
+    in_base = False
+    for line in (support.HERE / "invalid_campaigns.txt").read_text().splitlines(keepends=True):
+        if line.startswith("== "):
+            base, in_base = "", True
+        elif line == "\n":
+            in_base = False
+        elif in_base:
+            base += line
+        elif line.startswith("! "):
+            yield base + lines, line[2:-1]
+            lines = ""
+        elif not line.startswith("#"):
+            lines += line
+
+
+@pytest.mark.parametrize(("text", "expected"), list(read_invalid_campaigns()))
+def test_refuses_with_file_line_and_key(tmp_path, text, expected):
+    for name in ("base.yaml", "own.py"):
+        shutil.copy(support.HERE / name, tmp_path)
+    file = tmp_path / "campaign.yaml"
+    file.write_bytes(text.replace(r"\xe9", "\xe9").encode("latin1"))
     place = f"{file}:" if expected[0].isdigit() else ""
     with pytest.raises(InputError) as error:
         load_campaign(file)
@@ -31,9 +50,9 @@ def test_refuses_with_file_line_and_key(file):
     assert message == place + expected if place else message.endswith(expected)
 
 
-def test_errors_are_value_errors():
+def test_errors_are_value_errors(tmp_path):
     with pytest.raises(ValueError):
-        load_campaign(INVALID[0])
+        support.make_campaign(tmp_path, "runs: 0\n")
 
 
 def test_names_a_campaign_that_is_not_there(tmp_path):

@@ -1,4 +1,5 @@
-"""The shipped checks hold: all where they say, and those by three programs that no other test flies so."""
+"""The shipped checks hold on their placements. Those that no other test flies as three programs also hold as three
+programs."""
 
 import json
 

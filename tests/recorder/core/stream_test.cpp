@@ -147,7 +147,7 @@ TEST_F(MissingBatchTest, EachBatchInOrderBeginsTheWaitAgain) {
   EXPECT_EQ(stream_.last_step(), 1);
   add_at(18'900, 8);
   look_until(19'000);
-  EXPECT_EQ(stream_.last_step(), 3) << "for batch 4 the wait begins anew";
+  EXPECT_EQ(stream_.last_step(), 3) << "for batch 4 the wait begins again";
   look_until(28'900);
   EXPECT_EQ(stream_.last_step(), 3);
   look_until(29'000);

@@ -6,9 +6,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <map>
 #include <random>
 #include <set>
+#include <sstream>
 
 namespace sls::sim {
 
@@ -32,13 +35,10 @@ bus::PeerId make_peer(std::uint8_t number) {
   return peer;
 }
 
-const bus::PeerId kStrongPeer = make_peer(9);
-const bus::PeerId kWeakPeer = make_peer(5);
-const bus::PeerId kWeakestPeer = make_peer(4);
 const bus::PeerId kStranger = make_peer(7);
-const ReadyClient kStrong = {kStrongPeer, "strong", 10};
-const ReadyClient kWeak = {kWeakPeer, "weak", 1};
-const ReadyClient kWeakest = {kWeakestPeer, "weakest", 0};
+const ReadyClient kStrong = {make_peer(9), "strong", 10};
+const ReadyClient kWeak = {make_peer(5), "weak", 1};
+const ReadyClient kWeakest = {make_peer(4), "weakest", 0};
 
 OfferedAnswer make_answer(std::uint64_t step, double force_z = -10.0) {
   OfferedAnswer command;
@@ -50,718 +50,536 @@ OfferedAnswer make_answer(std::uint64_t step, double force_z = -10.0) {
   return command;
 }
 
-OfferedAnswer make_faulted(std::uint64_t step, ErrorCode error_code) {
-  OfferedAnswer command = make_answer(step);
-  command.answer.error_code = error_code;
-  command.answer.mission = MissionPhase::kFailed;
-  return command;
+/// Counters that are not zero, such as "superseded 2, rejected_step 1".
+std::string to_string(const SyncCounters& counters) {
+  std::string text;
+  const auto add = [&](const char* name, std::uint64_t count) {
+    if (count > 0) text += (text.empty() ? "" : ", ") + (name + (" " + std::to_string(count)));
+  };
+  add("late", counters.late());
+  add("duplicate", counters.duplicate());
+  add("superseded", counters.superseded());
+  add("take_overs", counters.take_overs());
+  add("rejected_not_finite", counters.rejected_not_finite());
+  add("rejected_force_limit", counters.rejected_force_limit());
+  add("rejected_run", counters.rejected_run());
+  add("rejected_step", counters.rejected_step());
+  add("rejected_vehicle", counters.rejected_vehicle());
+  add("rejected_client", counters.rejected_client());
+  add("rejected_fault", counters.rejected_fault());
+  return text;
 }
 
-/// Number of rejected commands. Exactly one counter counts each.
-std::uint64_t sum_rejections(const SyncCounters& counters) {
-  return counters.rejected_not_finite() + counters.rejected_force_limit() +
+/// Number of answers that were not taken. Exactly one counter counts each.
+std::uint64_t sum_unapplied(const SyncCounters& counters) {
+  return counters.late() + counters.duplicate() + counters.superseded() +
+         counters.rejected_not_finite() + counters.rejected_force_limit() +
          counters.rejected_run() + counters.rejected_step() + counters.rejected_vehicle() +
          counters.rejected_client() + counters.rejected_fault();
 }
-std::uint64_t sum_unapplied(const SyncCounters& counters) {
-  return counters.late() + counters.duplicate() + counters.superseded() + sum_rejections(counters);
-}
 
-class CommandGateTest : public testing::Test {
- protected:
-  CommandGateTest() {
-    gate_.set_clients({kStrong});
-    gate_.expect(0);
-  }
+// --- events --------------------------------------------------------------------------------------
 
-  void set_clients(const std::vector<ReadyClient>& clients) { gate_.set_clients(clients); }
-
-  /// Sets the clients that are there from the start: none of them is new.
-  void start_with(const std::vector<ReadyClient>& clients) {
-    gate_.set_clients({});
-    gate_.set_clients(clients);
-  }
-
-  /// Offers `command` from the only ready client. Expects that the gate rejects and counts it.
-  Verdict offer_bad(const OfferedAnswer& command) {
-    const auto before = sum_rejections(gate_.counters());
-    const Verdict verdict = gate_.offer(command, kStrongPeer);
-    EXPECT_FALSE(gate_.accepted());
-    EXPECT_EQ(sum_rejections(gate_.counters()), before + 1);
-    EXPECT_STRNE(to_string(verdict), "");
-    return verdict;
-  }
-
-  CommandGate gate_{kRun, kVehicle, {kForceLimit}};
+const std::map<std::string, Verdict> kVerdicts = {
+    {"accepted", Verdict::kAccepted},
+    {"held", Verdict::kHeld},
+    {"duplicate", Verdict::kDuplicate},
+    {"superseded", Verdict::kSuperseded},
+    {"late", Verdict::kLate},
+    {"not finite", Verdict::kNotFinite},
+    {"force limit", Verdict::kForceLimit},
+    {"other run", Verdict::kOtherRun},
+    {"early", Verdict::kEarly},
+    {"wrong step", Verdict::kWrongStep},
+    {"contradiction", Verdict::kContradiction},
+    {"unknown vehicle", Verdict::kUnknownVehicle},
+    {"unknown client", Verdict::kUnknownClient},
+    {"undefined", Verdict::kUndefined},
+    {"error code", Verdict::kErrorCode},
+    {"unknown stage", Verdict::kUnknownStage},
+    {"early end", Verdict::kEarlyEnd},
 };
 
-TEST_F(CommandGateTest, TheAwaitedAnswerOfAReadyClientIsAccepted) {
-  const OfferedAnswer answer = make_answer(0);
-  EXPECT_EQ(gate_.offer(answer, kStrongPeer), Verdict::kAccepted);
-  ASSERT_TRUE(gate_.accepted());
-  EXPECT_EQ(*gate_.accepted(), answer);
-  EXPECT_EQ(gate_.counters(), SyncCounters());
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
-}
-
-TEST_F(CommandGateTest, AnAnswerToAStateThatWasNotPublishedYetIsRefused) {
-  gate_.expect(4);
-  gate_.expect(5);
-  OfferedAnswer early = make_answer(5);
-  early.is_early = true;
-  EXPECT_EQ(offer_bad(early), Verdict::kEarly);
-  EXPECT_EQ(gate_.counters().rejected_step(), 1u);
-  OfferedAnswer late = make_answer(4);  // a late answer arrives before the next state
-  late.is_early = true;
-  EXPECT_EQ(gate_.offer(late, kStrongPeer), Verdict::kLate);
-  EXPECT_EQ(gate_.offer(make_answer(5), kStrongPeer), Verdict::kAccepted);
-}
-
-TEST_F(CommandGateTest, TheRefusedAnswerToTheAwaitedStepIsKept) {
-  EXPECT_FALSE(gate_.refused());
-  const OfferedAnswer faulted = make_faulted(0, ErrorCode::kFreeFall);
-  gate_.offer(faulted, kStrongPeer);
-  ASSERT_TRUE(gate_.refused());
-  EXPECT_EQ(*gate_.refused(), faulted);
-  gate_.expect(1);
-  EXPECT_FALSE(gate_.refused());
-}
-
-TEST_F(CommandGateTest, ExpectingTheNextStepForgetsTheAcceptedAnswer) {
-  gate_.offer(make_answer(0), kStrongPeer);
-  gate_.expect(1);
-  EXPECT_FALSE(gate_.accepted());
-  EXPECT_EQ(gate_.offer(make_answer(1), kStrongPeer), Verdict::kAccepted);
-}
-
-TEST_F(CommandGateTest, AForceAtTheLimitIsAcceptedAndJustBeyondRefused) {
-  OfferedAnswer beyond = make_answer(0);
-  beyond.answer.f_Q_W = {0, 0, -std::nextafter(kForceLimit, 100.0)};
-  EXPECT_EQ(offer_bad(beyond), Verdict::kForceLimit);
-  gate_.set_clients({});  // the refused client leaves, another one joins
-  gate_.set_clients({kWeak});
-  OfferedAnswer at_limit = make_answer(0);
-  at_limit.answer.f_Q_W = {30.0, 0.0, -40.0};
-  EXPECT_EQ(gate_.offer(at_limit, kWeakPeer), Verdict::kAccepted);
-}
-
-TEST_F(CommandGateTest, AForceWhoseSquaresOverflowIsBeyondTheLimit) {
-  OfferedAnswer command = make_answer(0);
-  command.answer.f_Q_W = {1e300, -1e300, 1e300};
-  EXPECT_EQ(offer_bad(command), Verdict::kForceLimit);
-  EXPECT_EQ(gate_.counters().rejected_force_limit(), 1u);
-}
-
-TEST_F(CommandGateTest, AnyNumberThatIsNotFiniteIsRefused) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  const double infinity = std::numeric_limits<double>::infinity();
-  std::uint64_t offered = 0;
-  for (const double bad : {nan, infinity, -infinity})
-    for (int axis = 0; axis < 3; ++axis) {
-      OfferedAnswer force = make_answer(0);
-      force.answer.f_Q_W[axis] = bad;
-      EXPECT_EQ(offer_bad(force), Verdict::kNotFinite);
-      OfferedAnswer memory = make_answer(0);
-      memory.answer.memory.numbers.setZero(3);
-      memory.answer.memory.numbers[axis] = bad;
-      EXPECT_EQ(offer_bad(memory), Verdict::kNotFinite);
-      offered += 2;
-    }
-  EXPECT_EQ(gate_.counters().rejected_not_finite(), offered);
-  gate_.expect(1);
-  OfferedAnswer memory = make_answer(1);
-  memory.answer.memory.numbers.setConstant(1, nan);
-  offer_bad(memory);
-  EXPECT_EQ(gate_.refusal(),
-            "controller 'strong' answered step 1 with a number that is not finite in "
-            "controller.numbers");
-}
-
-TEST_F(CommandGateTest, AReferenceThatIsNotFiniteIsRefusedAndNamed) {
-  const double infinity = std::numeric_limits<double>::infinity();
-  for (const double bad : {std::numeric_limits<double>::quiet_NaN(), infinity, -infinity})
-    for (int axis = 0; axis < 3; ++axis) {
-      std::array<OfferedAnswer, 5> answers;
-      answers.fill(make_answer(0));
-      answers[0].answer.reference.position[axis] = bad;
-      answers[1].answer.reference.velocity[axis] = bad;
-      answers[2].answer.reference.acceleration[axis] = bad;
-      answers[3].answer.reference.jerk[axis] = bad;
-      answers[4].answer.reference.snap[axis] = bad;
-      for (const OfferedAnswer& answer : answers) EXPECT_EQ(offer_bad(answer), Verdict::kNotFinite);
-    }
-  EXPECT_EQ(gate_.refusal(),
-            "controller 'strong' answered step 0 with a number that is not finite in reference");
-}
-
-TEST_F(CommandGateTest, TheLargestNumbersOfAReferenceAreFinite) {
-  OfferedAnswer answer = make_answer(0);
-  answer.answer.reference.snap.setConstant(std::numeric_limits<double>::max());
-  answer.answer.reference.jerk.setConstant(std::numeric_limits<double>::lowest());
-  EXPECT_EQ(gate_.offer(answer, kStrongPeer), Verdict::kAccepted);
-}
-
-TEST_F(CommandGateTest, AFaultIsNamedRatherThanItsReference) {
-  OfferedAnswer answer = make_faulted(0, ErrorCode::kFreeFall);
-  answer.answer.reference.jerk.setConstant(std::numeric_limits<double>::quiet_NaN());
-  EXPECT_EQ(offer_bad(answer), Verdict::kErrorCode);
-}
-
-TEST_F(CommandGateTest, ACommandOfAnotherRunIsRefusedAndNotCountedAgainstTheClient) {
-  OfferedAnswer command = make_answer(0);
-  command.run_id = kRun + 1;
-  EXPECT_EQ(offer_bad(command), Verdict::kOtherRun);
-  EXPECT_EQ(gate_.counters().rejected_run(), 1u);
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
-}
-
-TEST_F(CommandGateTest, ACommandForAnUnknownVehicleIsRefusedAndNotCountedAgainstTheClient) {
-  OfferedAnswer command = make_answer(0);
-  command.vehicle_id = kVehicle + 1;
-  EXPECT_EQ(offer_bad(command), Verdict::kUnknownVehicle);
-  EXPECT_EQ(gate_.counters().rejected_vehicle(), 1u);
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
-}
-
-TEST_F(CommandGateTest, AStepThatIsNotAwaitedIsRefusedAndNotCountedAgainstTheClient) {
-  std::uint64_t offered = 0;
-  for (const std::uint64_t step :
-       {std::uint64_t{1}, std::uint64_t{1000000}, std::numeric_limits<std::uint64_t>::max()}) {
-    EXPECT_EQ(offer_bad(make_answer(step)), Verdict::kWrongStep);
-    EXPECT_EQ(gate_.counters().rejected_step(), ++offered);
+/// An answer to a step with changes: "12 z=-3 free_fall" is one with another force and an error.
+OfferedAnswer parse_answer(const std::string& text) {
+  std::istringstream words(text);
+  std::uint64_t step = 0;
+  words >> step;
+  OfferedAnswer offered = make_answer(step);
+  model::Answer& answer = offered.answer;
+  model::Reference& reference = answer.reference;
+  Eigen::Vector3d numbers = Eigen::Vector3d::Zero();
+  const std::map<std::string, Eigen::Vector3d*> vectors = {
+      {"f", &answer.f_Q_W},
+      {"numbers", &numbers},
+      {"position", &reference.position},
+      {"velocity", &reference.velocity},
+      {"acceleration", &reference.acceleration},
+      {"jerk", &reference.jerk},
+      {"snap", &reference.snap}};
+  double value = 0.0;
+  const auto fail_with = [&](ErrorCode code) {
+    answer.error_code = code;
+    answer.mission = MissionPhase::kFailed;
+  };
+  const std::map<std::string, std::function<void()>> others = {
+      {"run", [&] { offered.run_id += static_cast<std::uint64_t>(value); }},
+      {"vehicle", [&] { offered.vehicle_id += static_cast<std::uint32_t>(value); }},
+      {"early", [&] { offered.is_early = true; }},
+      {"compute_ns", [&] { answer.compute_time = std::chrono::nanoseconds(int(value)); }},
+      {"stage", [&] { answer.memory.stage = static_cast<std::uint32_t>(value); }},
+      {"mission", [&] { answer.mission = MissionPhase(static_cast<std::uint32_t>(value)); }},
+      {"free_fall", [&] { fail_with(ErrorCode::kFreeFall); }},
+      {"rod_level", [&] { fail_with(ErrorCode::kRodLevel); }},
+      {"fault", [&] { answer.error_code = ErrorCode(static_cast<std::uint32_t>(value)); }}};
+  for (std::string word; words >> word;) {
+    const std::string key = word.substr(0, word.find('='));
+    value = word == key ? 0.0 : std::stod(word.substr(key.size() + 1));
+    if (const auto other = others.find(key); other != others.end())
+      other->second();
+    else  // "jerk_z" is a number of the reference
+      (*vectors.at(key.substr(0, key.find('_'))))[key.back() - 'x'] = value;
   }
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
+  if (text.find("numbers") != std::string::npos) answer.memory.numbers = numbers;
+  return offered;
 }
 
-TEST_F(CommandGateTest, AnAnswerOfAnUnannouncedClientIsRefused) {
-  EXPECT_EQ(gate_.offer(make_answer(0), kStranger), Verdict::kUnknownClient);
-  EXPECT_FALSE(gate_.accepted());
-  EXPECT_EQ(gate_.counters().rejected_client(), 1u);
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kAccepted);
-}
-
-TEST_F(CommandGateTest, NothingThatAnUnannouncedSenderSendsEndsTheFlight) {
-  OfferedAnswer not_finite = make_answer(0);
-  not_finite.answer.f_Q_W[0] = std::numeric_limits<double>::quiet_NaN();
-  OfferedAnswer excessive = make_answer(0);
-  excessive.answer.f_Q_W[0] = 1e6;
-  const std::vector<OfferedAnswer> bad = {not_finite, excessive,
-                                          make_faulted(0, ErrorCode::kFreeFall), make_answer(0),
-                                          make_answer(77)};
-  for (const OfferedAnswer& command : bad) {
-    gate_.offer(command, kStranger);
-    EXPECT_EQ(gate_.refusal(), std::nullopt);
-    EXPECT_FALSE(gate_.accepted());
-  }
-  EXPECT_EQ(sum_rejections(gate_.counters()), bad.size());
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kAccepted);
-}
-
-TEST_F(CommandGateTest, ACopyOfAnAcceptedCommandIsCountedDuplicate) {
-  gate_.offer(make_answer(0), kStrongPeer);
-  OfferedAnswer again = make_answer(0);
-  again.answer.compute_time =
-      std::chrono::nanoseconds(12345);  // the compute time is not part of the answer
-  EXPECT_EQ(gate_.offer(again, kStrongPeer), Verdict::kDuplicate);
-  gate_.expect(1);
-  EXPECT_EQ(gate_.offer(again, kStrongPeer), Verdict::kDuplicate);
-  gate_.offer(make_answer(1), kStrongPeer);
-  EXPECT_EQ(gate_.offer(again, kStrongPeer), Verdict::kDuplicate);
-  EXPECT_EQ(gate_.counters().duplicate(), 3u);
-  EXPECT_EQ(gate_.counters().rejected_step(), 0u);
-}
-
-TEST_F(CommandGateTest, AnotherAnswerToAnAnsweredStepIsNoCopy) {
-  gate_.offer(make_answer(0, -10.0), kStrongPeer);
-  EXPECT_EQ(gate_.offer(make_answer(0, -11.0), kStrongPeer), Verdict::kContradiction);
-  gate_.expect(1);
-  EXPECT_EQ(gate_.offer(make_answer(0, -11.0), kStrongPeer), Verdict::kContradiction);
-  EXPECT_EQ(gate_.counters().rejected_step(), 2u);
-  EXPECT_EQ(gate_.counters().duplicate(), 0u);
-  EXPECT_EQ(gate_.counters().superseded(), 0u);
-}
-
-TEST_F(CommandGateTest, AnotherClientsCopyOfAnAcceptedCommandIsNoDuplicate) {
-  gate_.offer(make_answer(0), kStrongPeer);
-  gate_.offer(make_answer(0), kStranger);
-  gate_.expect(1);
-  gate_.offer(make_answer(0), kStranger);
-  EXPECT_EQ(gate_.counters().duplicate(), 0u);
-  EXPECT_EQ(sum_rejections(gate_.counters()), 2u);
-}
-
-TEST_F(CommandGateTest, ACopyFromFarBackIsCountedAndMemoryStaysBounded) {
-  for (std::uint64_t step = 0; step < 10000; ++step) {
-    gate_.expect(step);
-    gate_.offer(make_answer(step), kStrongPeer);
-  }
-  EXPECT_EQ(gate_.offer(make_answer(9998), kStrongPeer), Verdict::kDuplicate);
-  // The gate remembers few steps: an older copy counts as a wrong step.
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kWrongStep);
-}
-
-// A standby that is further away than the remembered steps answers every state too late.
-TEST_F(CommandGateTest, OldAnswersOfADistantStandbyAreSupersededWhileAnotherClientFlies) {
-  set_clients({kStrong, kWeak});
-  for (std::uint64_t step = 0; step < 300; ++step) {
-    gate_.expect(step);
-    if (step >= 100) {
-      EXPECT_EQ(gate_.offer(make_answer(step - 100), kWeakPeer), Verdict::kSuperseded);
-    }
-    gate_.offer(make_answer(step), kStrongPeer);
-  }
-  EXPECT_EQ(gate_.counters().superseded(), 200u);
-  EXPECT_EQ(sum_rejections(gate_.counters()), 0u);
-  gate_.expect(300);
-  EXPECT_EQ(gate_.offer(make_answer(100), kStranger), Verdict::kWrongStep);    // not a client
-  EXPECT_EQ(gate_.offer(make_answer(100), kStrongPeer), Verdict::kWrongStep);  // the one that flies
-  EXPECT_EQ(gate_.offer(make_answer(400), kWeakPeer), Verdict::kWrongStep);    // of the future
-  OfferedAnswer bad = make_answer(100);
-  bad.answer.f_Q_W = {0.0, 0.0, 300.0};
-  EXPECT_EQ(gate_.offer(bad, kWeakPeer), Verdict::kForceLimit);
-}
-
-TEST_F(CommandGateTest, OldAnswersOfTheOnlyClientThatAnswersAreWrongSteps) {
-  set_clients({kStrong, kWeak});
-  for (std::uint64_t step = 0; step < 300; ++step) gate_.expect(step);  // none came in time
-  EXPECT_EQ(gate_.offer(make_answer(100), kWeakPeer), Verdict::kWrongStep);
-}
-
-// --- refusals ------------------------------------------------------------------------------------
-
-TEST_F(CommandGateTest, ARefusalOfTheOnlyClientNamesCauseClientAndStep) {
-  gate_.expect(41);
-  OfferedAnswer command = make_answer(41);
-  command.answer.f_Q_W[1] = std::numeric_limits<double>::quiet_NaN();
-  offer_bad(command);
-  ASSERT_TRUE(gate_.refusal());
-  EXPECT_NE(gate_.refusal()->find("'strong'"), std::string::npos) << *gate_.refusal();
-  EXPECT_NE(gate_.refusal()->find("41"), std::string::npos) << *gate_.refusal();
-  EXPECT_NE(gate_.refusal()->find("not finite"), std::string::npos) << *gate_.refusal();
-}
-
-TEST_F(CommandGateTest, AnExcessiveForceIsNamedWithItsLimit) {
-  OfferedAnswer command = make_answer(0);
-  command.answer.f_Q_W = {0, 300.0, -400.0};
-  offer_bad(command);
-  ASSERT_TRUE(gate_.refusal());
-  EXPECT_NE(gate_.refusal()->find("500 N > 50 N"), std::string::npos) << *gate_.refusal();
-  EXPECT_NE(gate_.refusal()->find("force_limit_n"), std::string::npos) << *gate_.refusal();
-}
-
-TEST_F(CommandGateTest, AFaultOfTheOnlyClientIsNamed) {
-  for (const auto& [fault, name] :
-       {std::pair{ErrorCode::kFreeFall, "free_fall"}, std::pair{ErrorCode::kRodLevel, "rod_level"},
-        std::pair{ErrorCode::kNotFinite, "not_finite"},
-        std::pair{ErrorCode::kStageTimeout, "stage_timeout"}}) {
-    CommandGate gate(kRun, kVehicle, {kForceLimit});
-    gate.set_clients({kStrong});
-    gate.expect(2);
-    EXPECT_EQ(gate.offer(make_faulted(2, fault), kStrongPeer), Verdict::kErrorCode);
-    EXPECT_EQ(gate.counters().rejected_fault(), 1u);
-    ASSERT_TRUE(gate.refusal());
-    EXPECT_NE(gate.refusal()->find(name), std::string::npos) << *gate.refusal();
-    EXPECT_NE(gate.refusal()->find("'strong'"), std::string::npos) << *gate.refusal();
-  }
-}
-
-TEST_F(CommandGateTest, AFailedMissionWithoutAFaultIsRefusedToo) {
-  EXPECT_EQ(offer_bad(make_faulted(0, ErrorCode::kNone)), Verdict::kErrorCode);
-  ASSERT_TRUE(gate_.refusal());
-  EXPECT_EQ(gate_.refusal()->find("none"), std::string::npos) << *gate_.refusal();
-}
-
-/// A gate of a mission of two stages that cannot be over before step 500, which awaits `step`.
-class MissionGateTest : public testing::Test {
+/// Plays events, separated by " | ", to a gate whose only client, "strong", is asked for step 0:
+///
+///     ready strong weak!   the clients; "!": gone
+///     expect 5             the step that is awaited now
+///     skip 100             steps that nobody answers
+///     fly 100 NAME         the client has its answers accepted, to the next 100 steps
+///     NAME ANSWER: VERDICT an answer (parse_answer), and what the gate says to it
+///     silent: yes          the awaited client is passed over
+///     miss: 2              its misses in a row
+///     mission 600          another gate, whose mission of two stages ends at step 500 at the
+///                          earliest, is asked for that step
+///
+/// The others are what the gate must then say. Words in parentheses explain.
+class GateEventsTest : public testing::Test {
  protected:
-  Verdict offer(std::uint64_t step, std::uint32_t stage, MissionPhase mission,
-                ErrorCode error_code = ErrorCode::kNone) {
-    gate_.emplace(kRun, kVehicle, AnswerLimits{kForceLimit, 2, 500});
-    gate_->set_clients({kStrong});
-    gate_->expect(step);
-    OfferedAnswer answer = make_answer(step);
-    answer.answer.memory.stage = stage;
-    answer.answer.mission = mission;
-    answer.answer.error_code = error_code;
-    return gate_->offer(answer, kStrongPeer);
+  GateEventsTest() { restart({kForceLimit}, 0); }
+
+  void play(const std::string& events) {
+    for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 3) {
+      end = events.find(" | ", begin);
+      const std::string event = events.substr(begin, end - begin);
+      SCOPED_TRACE(event);
+      play_one(event.substr(0, event.find(" (")));
+    }
   }
-  std::string refusal() const {
-    EXPECT_EQ(gate_->counters().rejected_fault(), 1u);
-    return gate_->refusal().value_or("none");
+
+  CommandGate& gate() { return *gate_; }
+
+ private:
+  void restart(const AnswerLimits& limits, std::uint64_t step) {
+    gate_.emplace(kRun, kVehicle, limits);
+    gate_->set_clients({kStrong});
+    gate_->expect(step_ = step);
+  }
+
+  static ReadyClient find(std::string name) {
+    const bool is_gone = name.back() == '!';
+    if (is_gone) name.pop_back();
+    const std::map<std::string, ReadyClient> clients = {
+        {"strong", kStrong},
+        {"weak", kWeak},
+        {"weakest", kWeakest},
+        {"stranger", {kStranger, "stranger", 0}},
+        {"restarted", {make_peer(88), "strong", 10}},  // a new process is a new participant
+        {"alpha", {make_peer(200), "alpha", 5}},
+        {"beta", {make_peer(1), "beta", 5}},
+        {"twin1", {make_peer(1), "twin", 5}},
+        {"twin2", {make_peer(2), "twin", 5}},
+        {"least", {make_peer(1), "a", std::numeric_limits<std::int32_t>::min()}},
+        {"greatest", {make_peer(2), "b", std::numeric_limits<std::int32_t>::max()}}};
+    ReadyClient client = clients.at(name);
+    client.is_gone = is_gone;
+    return client;
+  }
+
+  void play_one(const std::string& event) {
+    std::istringstream words(event);
+    std::string verb;
+    words >> verb;
+    const std::string rest = event.substr(std::min(event.size(), verb.size() + 1));
+    if (verb == "ready") {
+      std::vector<ReadyClient> clients;
+      for (std::string name; words >> name;) clients.push_back(find(name));
+      gate_->set_clients(clients);
+    } else if (verb == "expect") {
+      gate_->expect(step_ = std::stoull(rest));
+    } else if (verb == "mission") {
+      restart({kForceLimit, 2, 500}, std::stoull(rest));
+    } else if (verb == "skip") {
+      for (int i = 0; i < std::stoi(rest); ++i) gate_->expect(++step_);
+    } else if (verb == "fly") {
+      const ReadyClient flyer = find(rest.substr(rest.find(' ') + 1));
+      for (int i = 0; i < std::stoi(rest); ++i) {
+        ASSERT_EQ(gate_->offer(make_answer(step_), flyer.peer), Verdict::kAccepted) << step_;
+        gate_->expect(++step_);
+      }
+    } else if (verb == "silent:") {
+      EXPECT_EQ(gate_->pass_over_silent_client(), rest == "yes");
+    } else if (verb == "miss:") {
+      EXPECT_EQ(gate_->count_miss(), std::stoi(rest));
+    } else if (verb == "awaits") {
+      const auto awaited = gate_->awaited_client();
+      EXPECT_EQ(awaited ? awaited->name + (awaited->is_gone ? "!" : "") : "nobody", rest);
+    } else if (verb == "applies") {
+      expect_answer(gate_->accepted(), rest);
+    } else if (verb == "refused") {
+      expect_answer(gate_->refused(), rest);
+    } else if (verb == "refusal") {
+      EXPECT_EQ(gate_->refusal().value_or("none"), rest);
+    } else if (verb == "refusals") {
+      EXPECT_EQ(gate_->describe_refusals(), rest);
+    } else if (verb == "take-over") {
+      const auto& change = gate_->take_over();
+      EXPECT_EQ(change ? change->from + " " + change->to : "none", rest);
+    } else if (verb == "answers") {
+      std::map<bus::PeerId, std::string> known;
+      gate_->for_each_client([&](const bus::PeerId& peer, std::uint64_t answers, bool is_missing) {
+        known[peer] = std::to_string(answers) + (is_missing ? " missing" : "");
+      });
+      const std::size_t space = rest.find(' ');
+      EXPECT_EQ(known[find(rest.substr(0, space)).peer], rest.substr(space + 1));
+    } else {
+      const std::size_t colon = rest.find(": ");
+      const OfferedAnswer offered = parse_answer(rest.substr(0, colon));
+      EXPECT_EQ(gate_->offer(offered, find(verb).peer), kVerdicts.at(rest.substr(colon + 2)));
+    }
+  }
+
+  static void expect_answer(const std::optional<OfferedAnswer>& answer, const std::string& text) {
+    ASSERT_EQ(answer.has_value(), text != "none");
+    EXPECT_EQ(answer, answer ? std::optional(parse_answer(text)) : std::nullopt);
   }
 
   std::optional<CommandGate> gate_;
+  std::uint64_t step_ = 0;
 };
 
-TEST_F(MissionGateTest, AStageBeyondTheMissionIsRefused) {
-  EXPECT_EQ(offer(600, 4'000'000'000, MissionPhase::kRunning), Verdict::kUnknownStage);
-  EXPECT_EQ(refusal(),
-            "controller 'strong' answered step 600 with a stage beyond its mission: stage_index "
-            "4000000000 > 2");
-  EXPECT_EQ(offer(600, 3, MissionPhase::kFinished), Verdict::kUnknownStage);
-  EXPECT_EQ(offer(600, 2, MissionPhase::kFinished), Verdict::kAccepted);
-  EXPECT_EQ(offer(600, 2, MissionPhase::kRunning), Verdict::kAccepted)
-      << "reported by ParticipantCheck";
-  EXPECT_EQ(offer(0, 1, MissionPhase::kRunning), Verdict::kAccepted)
-      << "as if the first stage were over";
+struct Row {
+  const char* name;
+  const char* events;
+  const char* counters;  // in the end
+};
+
+class CommandGateTest : public GateEventsTest, public testing::WithParamInterface<Row> {};
+
+// --- table ---------------------------------------------------------------------------------------
+
+const Row kRows[] = {
+    {"TheAwaitedAnswerOfAReadyClientIsAccepted",
+     "strong 0: accepted | applies 0 | refusal none | refused none", ""},
+    {"AnAnswerToAStateThatWasNotPublishedYetIsRefused",
+     "expect 4 | expect 5 | strong 5 early: early | applies none | refusal none | "
+     "strong 4 early: late (it arrives before the next state) | strong 5: accepted",
+     "rejected_step 1"},
+    {"TheRefusedAnswerToTheAwaitedStepIsKept",
+     "refused none | strong 0 free_fall: error code | refused 0 free_fall | applies none | "
+     "expect 1 | refused none",
+     "rejected_fault 1"},
+    {"ExpectingTheNextStepForgetsTheAcceptedAnswer",
+     "strong 0: accepted | expect 1 | applies none | strong 1: accepted | applies 1", ""},
+    {"AForceAtTheLimitIsAcceptedAndJustBeyondRefused",
+     "strong 0 f_x=0 f_y=0 f_z=-50.000000000000007: force limit | applies none | "
+     "ready | ready weak | weak 0 f_x=30 f_y=0 f_z=-40: accepted",
+     "rejected_force_limit 1"},
+    {"AForceWhoseSquaresOverflowIsBeyondTheLimit",
+     "strong 0 f_x=1e300 f_y=-1e300 f_z=1e300: force limit | applies none",
+     "rejected_force_limit 1"},
+    {"TheLargestNumbersOfAReferenceAreFinite",
+     "strong 0 snap_x=1.7976931348623157e308 snap_y=1.7976931348623157e308 "
+     "jerk_x=-1.7976931348623157e308 jerk_y=-1.7976931348623157e308: accepted",
+     ""},
+    {"AFaultIsNamedRatherThanItsReference", "strong 0 free_fall jerk_x=nan: error code",
+     "rejected_fault 1"},
+    {"ACommandOfAnotherRunIsRefusedAndNotCountedAgainstTheClient",
+     "strong 0 run=1: other run | applies none | refusal none", "rejected_run 1"},
+    {"ACommandForAnUnknownVehicleIsRefusedAndNotCountedAgainstTheClient",
+     "strong 0 vehicle=1: unknown vehicle | applies none | refusal none", "rejected_vehicle 1"},
+    {"AStepThatIsNotAwaitedIsRefusedAndNotCountedAgainstTheClient",
+     "strong 1: wrong step | strong 1000000: wrong step | "
+     "strong 18446744073709551615: wrong step | applies none | refusal none",
+     "rejected_step 3"},
+    {"AnAnswerOfAnUnannouncedClientIsRefused",
+     "stranger 0: unknown client | applies none | strong 0: accepted", "rejected_client 1"},
+    {"NothingThatAnUnannouncedSenderSendsEndsTheFlight",
+     "stranger 0 f_x=nan: not finite | refusal none | stranger 0 f_x=1e6: force limit | "
+     "refusal none | stranger 0 free_fall: error code | refusal none | "
+     "stranger 0: unknown client | refusal none | stranger 77: wrong step | refusal none | "
+     "applies none | strong 0: accepted",
+     "rejected_not_finite 1, rejected_force_limit 1, rejected_step 1, rejected_client 1, "
+     "rejected_fault 1"},
+    {"ACopyOfAnAcceptedCommandIsCountedDuplicate",
+     "strong 0: accepted | strong 0 compute_ns=12345: duplicate (the time is not compared) | "
+     "expect 1 | strong 0: duplicate | strong 1: accepted | strong 0: duplicate",
+     "duplicate 3"},
+    {"AnotherAnswerToAnAnsweredStepIsNoCopy",
+     "strong 0: accepted | strong 0 f_z=-11: contradiction | expect 1 | "
+     "strong 0 f_z=-11: contradiction",
+     "rejected_step 2"},
+    {"AnotherClientsCopyOfAnAcceptedCommandIsNoDuplicate",
+     "strong 0: accepted | stranger 0: unknown client | expect 1 | stranger 0: wrong step",
+     "rejected_step 1, rejected_client 1"},
+    {"ACopyFromFarBackIsCountedAndMemoryStaysBounded",
+     "fly 10000 strong | strong 9998: duplicate | strong 0: wrong step (forgotten)",
+     "duplicate 1, rejected_step 1"},
+
+    // --- refusals
+    {"ARefusalOfTheOnlyClientNamesCauseClientAndStep",
+     "expect 41 | strong 41 f_y=nan: not finite | "
+     "refusal controller 'strong' answered step 41 with a number that is not finite",
+     "rejected_not_finite 1"},
+    {"AnExcessiveForceIsNamedWithItsLimit",
+     "strong 0 f_x=0 f_y=300 f_z=-400: force limit | refusal controller 'strong' answered step 0 "
+     "with a force beyond controller.force_limit_n: 500 N > 50 N",
+     "rejected_force_limit 1"},
+    {"AFaultOfTheOnlyClientIsNamed",
+     "expect 2 | strong 2 fault=1 mission=2: error code | "
+     "refusal controller 'strong' answered step 2 with a fault: free_fall | "
+     "expect 3 | strong 3 fault=2 mission=2: error code | "
+     "refusal controller 'strong' answered step 3 with a fault: rod_level | "
+     "expect 4 | strong 4 fault=3 mission=2: error code | "
+     "refusal controller 'strong' answered step 4 with a fault: not_finite | "
+     "expect 5 | strong 5 fault=4 mission=2: error code | "
+     "refusal controller 'strong' answered step 5 with a fault: stage_timeout",
+     "rejected_fault 4"},
+    {"AFailedMissionWithoutAFaultIsRefusedToo",
+     "strong 0 mission=2: error code | applies none | "
+     "refusal controller 'strong' answered step 0 with a fault: mission failed",
+     "rejected_fault 1"},
+    {"AStageBeyondTheMissionIsRefused",
+     "mission 600 | strong 600 stage=4000000000: unknown stage | refusal controller 'strong' "
+     "answered step 600 with a stage beyond its mission: stage_index 4000000000 > 2 | "
+     "expect 601 | strong 601 stage=3 mission=1: unknown stage | "
+     "expect 602 | strong 602 stage=2 mission=1: accepted | "
+     "expect 603 | strong 603 stage=2: accepted (reported by ParticipantCheck)",
+     "rejected_fault 2"},
+    {"AStageMayBeAsIfTheFirstOneWereOver", "mission 0 | strong 0 stage=1: accepted", ""},
+    {"AnEndBeforeTheEarliestStepIsRefused",
+     "mission 499 | strong 499 stage=1 mission=1: early end | refusal controller 'strong' answered "
+     "step 499 with an early end of its mission: expected at step 500 or later | "
+     "strong 499 stage=2: early end (the next client would finish) | "
+     "expect 500 | strong 500 stage=1 mission=1: accepted",
+     "rejected_fault 2"},
+    {"AnEndAfterTheLastStageAtTheEarliestStepIsAccepted",
+     "mission 500 | strong 500 stage=2 mission=1: accepted", ""},
+    {"ValuesThatTheContractDoesNotDefineAreRefused",
+     "expect 1 | strong 1 mission=7: undefined | "
+     "refusal controller 'strong' answered step 1 with an undefined value: mission 7 | "
+     "expect 2 | strong 2 mission=2 fault=5: undefined | "
+     "refusal controller 'strong' answered step 2 with an undefined value: fault 5 | "
+     "strong 2 mission=4294967295: undefined",
+     "rejected_fault 3"},
+    {"AFaultInAnswerToAnotherStepEndsNothing",
+     "strong 1 free_fall: error code | refusal none | strong 0: accepted", "rejected_fault 1"},
+    {"ARefusalDoesNotOutliveItsStep",
+     "ready strong weak | strong 0 rod_level: error code | weak 0: accepted | expect 1 | "
+     "strong 1: accepted",
+     "take_overs 1, rejected_fault 1"},
+    {"NoRefusalWhileAnotherReadyClientCanAnswer",
+     "ready strong weak | strong 0 rod_level: error code | refusal none | awaits weak | "
+     "weak 0 free_fall: error code | refusal controller 'strong' answered step 0 with a fault: "
+     "rod_level; controller 'weak' answered step 0 with a fault: free_fall",
+     "rejected_fault 2"},
+    {"ARefusalIsKnownWhileASilentStandbyIsAwaited",
+     "ready strong weak | strong 0 f_x=0 f_y=0 f_z=-60: force limit | refusals controller 'strong' "
+     "answered step 0 with a force beyond controller.force_limit_n: 60 N > 50 N | expect 1 | "
+     "refusals controller 'strong' answered step 0 with a force beyond controller.force_limit_n: "
+     "60 N > 50 N | awaits strong (its answer to this step may be valid) | "
+     "strong 1: accepted | refusals ",
+     "rejected_force_limit 1"},
+    {"ALateAnswerThatIsRefusedIsKnownUntilItsClientGivesAValidOne",
+     "expect 1 | strong 0 rod_level: error code | refusals controller 'strong' answered step 0 "
+     "with a fault: rod_level | refusal none | expect 2 | strong 1: late | refusals ",
+     "rejected_fault 1"},
+    {"TheRefusedClientsStandbyLeavingEndsTheWait",
+     "ready strong weak | strong 0 rod_level: error code | refusal none | ready strong | "
+     "refusal controller 'strong' answered step 0 with a fault: rod_level",
+     "rejected_fault 1"},
+    {"TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefused",
+     "ready strong weak | weak 0: held | applies none | strong 0 free_fall: error code | "
+     "applies 0 | refusal none",
+     "rejected_fault 1"},
+    {"AfterARefusedAnswerToAStepTheClientIsNotAwaitedThere",
+     "ready strong weak | strong 0 free_fall: error code | refusals controller 'strong' answered "
+     "step 0 with a fault: free_fall | strong 0 rod_level: error code | refusals controller "
+     "'strong' answered step 0 with a fault: free_fall | strong 0: held (also before a valid one) "
+     "| awaits weak | weak 0: accepted | ready strong weak! | refusal none | expect 1 | "
+     "strong 0 free_fall: error code | refusals  (the step before had its answer, too)",
+     "superseded 1, rejected_fault 3"},
+    {"ABadCommandAfterAClientsValidAnswerIsOnlyCounted",
+     "ready strong weak | weak 0: held | weak 0 free_fall: error code | "
+     "strong 0 free_fall: error code | applies 0 | refusal none",
+     "rejected_fault 2"},
+
+    // --- several clients
+    {"TheStrongestClientFliesAlsoWhenAnotherAnswersFirst",
+     "ready weakest strong weak | weakest 0 f_z=-1: held | weak 0 f_z=-2: held | "
+     "strong 0 f_z=-3: accepted | applies 0 f_z=-3",
+     "superseded 2"},
+    {"AWeakerClientsLateAnswerIsSuperseded",
+     "ready strong weak | strong 0: accepted | weak 0: superseded | expect 1 | weak 0: superseded",
+     "superseded 2"},
+    {"CopiesOfAHeldAnswerAreCounted",
+     "ready strong weak | weak 0: held | weak 0: duplicate | weak 0: duplicate | "
+     "weak 0: duplicate | strong 0: accepted",
+     "duplicate 3, superseded 1"},
+    {"EqualStrengthsAreOrderedByNameNotByArrival",
+     "ready | ready alpha beta | awaits alpha | beta 0 f_z=-2: held | alpha 0 f_z=-1: accepted | "
+     "ready | ready beta alpha | expect 1 | awaits alpha | beta 1 f_z=-2: held | "
+     "alpha 1 f_z=-1: accepted",
+     "superseded 2"},
+    {"EqualStrengthsAndNamesAreOrderedByPeer",
+     "ready | ready twin1 twin2 | twin2 0: held | twin1 0: accepted | "
+     "ready | ready twin2 twin1 | expect 1 | twin2 1: held | twin1 1: accepted",
+     "superseded 2"},
+    {"StrengthDecidesOverTheWholeRangeOfItsType", "ready | ready least greatest | awaits b", ""},
+    {"TheStandbysHeldAnswerFliesWhenTheStrongestIsSilent",
+     "ready strong weak | weak 0 f_z=-2: held | silent: yes | applies 0 f_z=-2", "take_overs 1"},
+    {"TheNextClientIsAwaitedWhenTheStrongestIsSilent",
+     "ready | ready strong weak weakest | silent: yes | awaits weak | applies none | silent: yes | "
+     "awaits weakest | take-over none | weakest 0: accepted | take-over strong weakest",
+     "take_overs 1"},
+    {"WithoutAnotherClientThereIsNoTakeOver",
+     "silent: no | take-over none | awaits strong | refusal none", ""},
+    {"ARefusedClientDoesNotTakeOver",
+     "ready strong weak | weak 0 free_fall: error code | silent: no | awaits strong",
+     "rejected_fault 1"},
+    {"NothingIsPassedOverOnceAnAnswerIsAccepted",
+     "ready strong weak | strong 0: accepted | silent: no", ""},
+    {"TheSilentClientIsSkippedUntilItAnswersAnAwaitedStep",
+     "ready | ready strong weak | silent: yes | weak 0: accepted | expect 1 | "
+     "awaits weak (no second wait for the silent one) | strong 0: superseded | "
+     "awaits weak (step 0 is not awaited any more) | strong 1: accepted | take-over weak strong | "
+     "expect 2 | awaits strong | take-over none",
+     "superseded 1, take_overs 2"},
+    {"TheStrongestIsAwaitedAgainAlsoIfItsAnswerCameSecond",
+     "ready | ready strong weak | silent: yes | weak 0: accepted | strong 0: superseded | "
+     "expect 1 | awaits strong",
+     "superseded 1, take_overs 1"},
+    {"TheFirstAnswerToAStepThatWentByIsLateAndTheOthersAreNot",
+     "ready strong weak | expect 1 | expect 2 | strong 0: late | strong 0: duplicate | "
+     "weak 0: superseded | stranger 1: wrong step | weak 1: late | applies none",
+     "duplicate 1, superseded 1, rejected_step 1"},
+    {"MissesAreCountedInARowAndForgottenWithAnAnswer",
+     "miss: 1 | expect 1 | miss: 2 | expect 2 | strong 2: accepted | expect 3 | miss: 1 | ready | "
+     "miss: 0 (nobody is awaited)",
+     ""},
+    {"WhenAllAreSilentTheStrongestMayComeBack",
+     "ready | ready strong weak weakest | silent: yes | silent: yes | silent: no | "
+     "strong 0: accepted",
+     ""},
+    {"WhenAllAreSilentTheNextMayComeBack",
+     "ready | ready strong weak weakest | silent: yes | silent: yes | silent: no | "
+     "weak 0: accepted",
+     "take_overs 1"},
+    {"WhenAllAreSilentTheWeakestMayComeBack",
+     "ready | ready strong weak weakest | silent: yes | silent: yes | silent: no | "
+     "weakest 0: accepted",
+     "take_overs 1"},
+    {"AStrongerClientThatJoinsFliesAfterItsFirstAnswer",
+     "ready | ready weak | weak 0: accepted | expect 1 | ready weak strong | "
+     "weak 1: accepted (the other may not see step 1) | strong 1: superseded | expect 2 | "
+     "weak 2: held | strong 2: accepted",
+     "superseded 2, take_overs 1"},
+    {"ADistantClientThatJoinsMayAnswerAnEarlierStepFirst",
+     "ready weak | weak 0: accepted | expect 1 | weak 1: accepted | expect 2 | ready weak strong | "
+     "strong 1: superseded | awaits strong",
+     "superseded 1"},
+    {"AClientThatJoinsAloneIsAwaitedAtOnce",
+     "strong 0: accepted | expect 1 | ready | ready weak | awaits weak | weak 1: accepted",
+     "take_overs 1"},
+    {"AHeldAnswerFliesWhenTheStrongerClientLeaves",
+     "ready strong weak | weak 0 f_z=-2: held | ready weak | applies 0 f_z=-2", ""},
+    {"AnswersOfAClientThatLeftAreCounted",
+     "ready strong weak | weak 0: held | ready strong | strong 0: accepted", "superseded 1"},
+    {"SilenceOutlivesANewRosterAndARestartedClientBeginsAfresh",
+     "ready | ready strong weak | silent: yes | ready weak strong | awaits weak | "
+     "ready weak restarted | awaits weak | restarted 0: accepted",
+     "take_overs 1"},
+    {"WithoutClientsNothingIsAwaitedAndNothingRefused",
+     "ready | awaits nobody | refusal none | silent: no | strong 0: unknown client",
+     "rejected_client 1"},
+    {"OldAnswersOfTheOnlyClientThatAnswersAreWrongSteps",
+     "ready strong weak | skip 299 | weak 100: wrong step", "rejected_step 1"},
+
+    // --- gone
+    {"AClientThatIsGoneIsAwaitedOnlyIfNoOtherIsThere",
+     "ready strong! weak | awaits weak | weak 0: accepted | ready strong! | awaits strong!", ""},
+    {"AHeldAnswerIsTakenWhenTheAwaitedClientIsGone",
+     "ready strong weak | weak 0: held | ready strong! weak | applies 0", ""},
+    {"OneThatIsGoneDoesNotTakeOver", "ready strong weak! | silent: no", ""},
+    {"ASilentClientIsAwaitedRatherThanOneThatIsGone",
+     "ready | ready strong weak | silent: yes | silent: no | ready strong! weak | awaits weak", ""},
+    {"AnAnswerBringsAClientBackThatWasGone",
+     "ready strong! weak | strong 0: accepted | awaits strong", ""},
+    {"ARefusalEndsTheRunAtOnceIfAllOthersAreGone",
+     "ready strong! weak | weak 0 free_fall: error code | "
+     "refusal controller 'weak' answered step 0 with a fault: free_fall | "
+     "ready strong! | refusal none (it may come back)",
+     "rejected_fault 1"},
+    {"ItCountsTheAnswersOfEachClientAndKnowsWhichAreMissing",
+     "ready strong weak | answers strong 0 missing | strong 0: accepted | weak 0: superseded | "
+     "answers strong 1 | answers weak 1 | expect 1 | expect 2 | weak 1: late | "
+     "answers weak 2 missing | weak 2 run=1: other run | "
+     "answers weak 3 missing (refused, but its sender is there)",
+     "superseded 1, rejected_run 1"},
+};
+
+TEST_P(CommandGateTest, JudgesAnswersByTheTable) {
+  play(GetParam().events);
+  EXPECT_EQ(to_string(gate().counters()), GetParam().counters);
 }
 
-TEST_F(MissionGateTest, AnEndBeforeTheEarliestStepIsRefused) {
-  EXPECT_EQ(offer(499, 1, MissionPhase::kFinished), Verdict::kEarlyEnd);
-  EXPECT_EQ(refusal(),
-            "controller 'strong' answered step 499 with an early end of its mission: expected at "
-            "step 500 or later");
-  EXPECT_EQ(offer(499, 2, MissionPhase::kRunning), Verdict::kEarlyEnd)
-      << "the next client would finish";
-  EXPECT_EQ(offer(500, 1, MissionPhase::kFinished), Verdict::kAccepted);
-  EXPECT_EQ(offer(500, 2, MissionPhase::kFinished), Verdict::kAccepted);
+INSTANTIATE_TEST_SUITE_P(Rows, CommandGateTest, testing::ValuesIn(kRows),
+                         [](const auto& row) { return std::string(row.param.name); });
+
+// --- more than a row can say ---------------------------------------------------------------------
+
+using CommandGateSeriesTest = GateEventsTest;
+
+TEST_F(CommandGateSeriesTest, AnyNumberThatIsNotFiniteIsRefused) {
+  for (const std::string bad : {"=nan", "=inf", "=-inf"})
+    for (const std::string axis : {"_x", "_y", "_z"})
+      for (const std::string vector :
+           {"f", "numbers", "position", "velocity", "acceleration", "jerk", "snap"})
+        play("strong 0 " + vector + axis + bad + ": not finite | applies none");
+  EXPECT_EQ(to_string(gate().counters()), "rejected_not_finite 63");
+  const std::string refusal =
+      "refusal controller 'strong' answered step 1 with a number that is not finite";
+  play("expect 1 | strong 1 numbers_x=nan: not finite | " + refusal + " in controller.numbers");
+  play("strong 1 jerk_x=nan: not finite | expect 2 | strong 2 jerk_x=nan: not finite");
+  EXPECT_EQ(gate().refusal(),
+            "controller 'strong' answered step 2 with a number that is not finite in reference");
 }
 
-TEST_F(MissionGateTest, ValuesThatTheContractDoesNotDefineAreRefused) {
-  EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(7)), Verdict::kUndefined);
-  EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: mission 7");
-  EXPECT_EQ(offer(600, 1, MissionPhase::kFailed, static_cast<ErrorCode>(5)), Verdict::kUndefined);
-  EXPECT_EQ(refusal(), "controller 'strong' answered step 600 with an undefined value: fault 5");
-  EXPECT_EQ(offer(600, 1, static_cast<MissionPhase>(0xffffffffU)), Verdict::kUndefined);
+// A standby that is further away than the remembered steps answers every state too late.
+TEST_F(CommandGateSeriesTest, OldAnswersOfADistantStandbyAreSupersededWhileAnotherClientFlies) {
+  play("ready strong weak | fly 100 strong");
+  for (int step = 0; step < 200; ++step)
+    play("weak " + std::to_string(step) + ": superseded | fly 1 strong");
+  EXPECT_EQ(to_string(gate().counters()), "superseded 200");
+  play(
+      "stranger 100: wrong step (not a client) | strong 100: wrong step (the one that flies) | "
+      "weak 400: wrong step (of the future) | weak 100 f_x=0 f_y=0 f_z=300: force limit");
 }
 
-TEST_F(CommandGateTest, AFaultInAnswerToAnotherStepEndsNothing) {
-  EXPECT_EQ(gate_.offer(make_faulted(1, ErrorCode::kFreeFall), kStrongPeer), Verdict::kErrorCode);
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kAccepted);
+TEST(CommandGateStartTest, NoAnswerIsMissingBeforeAStateIsPublished) {
+  CommandGate waiting(kRun, kVehicle, {kForceLimit});
+  waiting.set_clients({kStrong});
+  waiting.for_each_client([](const bus::PeerId& peer, std::uint64_t answers, bool is_missing) {
+    EXPECT_EQ(peer, kStrong.peer);
+    EXPECT_EQ(answers, 0u);
+    EXPECT_FALSE(is_missing);
+  });
 }
 
-TEST_F(CommandGateTest, ARefusalDoesNotOutliveItsStep) {
-  gate_.set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, ErrorCode::kRodLevel), kStrongPeer);
-  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kAccepted);
-  gate_.expect(1);
-  EXPECT_EQ(gate_.offer(make_answer(1), kStrongPeer), Verdict::kAccepted);
-}
-
-TEST_F(CommandGateTest, NoRefusalWhileAnotherReadyClientCanAnswer) {
-  set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, ErrorCode::kRodLevel), kStrongPeer);
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
-  ASSERT_TRUE(gate_.awaited_client());
-  EXPECT_EQ(gate_.awaited_client()->name, "weak");
-  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kWeakPeer);
-  ASSERT_TRUE(gate_.refusal());
-  EXPECT_NE(gate_.refusal()->find("answered step 0"), std::string::npos);
-}
-
-TEST_F(CommandGateTest, ARefusalIsKnownWhileASilentStandbyIsAwaited) {
-  set_clients({kStrong, kWeak});
-  OfferedAnswer beyond = make_answer(0);
-  beyond.answer.f_Q_W = {0, 0, -60.0};
-  gate_.offer(beyond, kStrongPeer);
-  for (const char* words : {"'strong' answered step 0", "force_limit_n: 60 N > 50 N"})
-    EXPECT_NE(gate_.describe_refusals().find(words), std::string::npos)
-        << gate_.describe_refusals();
-  gate_.expect(1);
-  EXPECT_NE(gate_.describe_refusals().find("'strong' answered step 0"), std::string::npos)
-      << "nobody has answered since";
-  EXPECT_EQ(gate_.awaited_client()->name, "strong") << "its answer to this step may be valid";
-  gate_.offer(make_answer(1), kStrongPeer);
-  EXPECT_EQ(gate_.describe_refusals(), "");
-}
-
-TEST_F(CommandGateTest, ALateAnswerThatIsRefusedIsKnownUntilItsClientGivesAValidOne) {
-  gate_.expect(1);
-  gate_.offer(make_faulted(0, ErrorCode::kRodLevel), kStrongPeer);
-  EXPECT_NE(gate_.describe_refusals().find("rod_level"), std::string::npos);
-  EXPECT_EQ(gate_.refusal(), std::nullopt) << "the awaited step may still get its answer";
-  gate_.expect(2);
-  gate_.offer(make_answer(1), kStrongPeer);
-  EXPECT_EQ(gate_.describe_refusals(), "");
-}
-
-TEST_F(CommandGateTest, TheRefusedClientsStandbyLeavingEndsTheWait) {
-  set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, ErrorCode::kRodLevel), kStrongPeer);
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
-  set_clients({kStrong});
-  ASSERT_TRUE(gate_.refusal());
-  EXPECT_NE(gate_.refusal()->find("rod_level"), std::string::npos) << *gate_.refusal();
-}
-
-TEST_F(CommandGateTest, TheAnswerAStandbyHasGivenIsTakenWhenTheStrongerOneIsRefused) {
-  set_clients({kStrong, kWeak});
-  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kHeld);
-  EXPECT_FALSE(gate_.accepted());
-  EXPECT_EQ(gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer), Verdict::kErrorCode);
-  ASSERT_TRUE(gate_.accepted());
-  EXPECT_EQ(*gate_.accepted(), make_answer(0));
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
-}
-
-TEST_F(CommandGateTest, AfterARefusedAnswerToAStepTheClientIsNotAwaitedThere) {
-  set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer);
-  const std::string first = gate_.describe_refusals();
-  EXPECT_NE(first.find("free_fall"), std::string::npos) << first;
-  gate_.offer(make_faulted(0, ErrorCode::kRodLevel), kStrongPeer);
-  EXPECT_EQ(gate_.describe_refusals(), first) << "the first one counts";
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kHeld) << "also before a valid one";
-  EXPECT_EQ(gate_.awaited_client()->name, "weak");
-  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kAccepted);
-  set_clients({kStrong, {kWeakPeer, "weak", 1, true}});
-  EXPECT_EQ(gate_.refusal(), std::nullopt) << "the step has its answer";
-  gate_.expect(1);
-  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer);
-  EXPECT_EQ(gate_.describe_refusals(), "") << "the step before had its answer, too";
-}
-
-TEST_F(CommandGateTest, ABadCommandAfterAClientsValidAnswerIsOnlyCounted) {
-  set_clients({kStrong, kWeak});
-  gate_.offer(make_answer(0), kWeakPeer);
-  EXPECT_EQ(gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kWeakPeer), Verdict::kErrorCode);
-  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kStrongPeer);
-  ASSERT_TRUE(gate_.accepted()) << "the standby's valid answer was there first";
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
-}
-
-// --- several clients -----------------------------------------------------------------------------
-
-TEST_F(CommandGateTest, TheStrongestClientFliesAlsoWhenAnotherAnswersFirst) {
-  set_clients({kWeakest, kStrong, kWeak});
-  EXPECT_EQ(gate_.offer(make_answer(0, -1.0), kWeakestPeer), Verdict::kHeld);
-  EXPECT_EQ(gate_.offer(make_answer(0, -2.0), kWeakPeer), Verdict::kHeld);
-  EXPECT_EQ(gate_.offer(make_answer(0, -3.0), kStrongPeer), Verdict::kAccepted);
-  EXPECT_EQ(*gate_.accepted(), make_answer(0, -3.0));
-  EXPECT_EQ(gate_.counters().superseded(), 2u);
-}
-
-TEST_F(CommandGateTest, AWeakerClientsLateAnswerIsSuperseded) {
-  set_clients({kStrong, kWeak});
-  gate_.offer(make_answer(0), kStrongPeer);
-  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kSuperseded);
-  gate_.expect(1);
-  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kSuperseded);
-  EXPECT_EQ(gate_.counters().superseded(), 2u);
-  EXPECT_EQ(sum_rejections(gate_.counters()), 0u);
-}
-
-TEST_F(CommandGateTest, CopiesOfAHeldAnswerAreCounted) {
-  set_clients({kStrong, kWeak});
-  for (int i = 0; i < 4; ++i) gate_.offer(make_answer(0), kWeakPeer);
-  gate_.offer(make_answer(0), kStrongPeer);
-  EXPECT_EQ(sum_unapplied(gate_.counters()), 4u);
-  EXPECT_EQ(sum_rejections(gate_.counters()), 0u);
-}
-
-TEST_F(CommandGateTest, EqualStrengthsAreOrderedByNameNotByArrival) {
-  const ReadyClient alpha = {make_peer(200), "alpha", 5};
-  const ReadyClient beta = {make_peer(1), "beta", 5};
-  for (const auto& clients : {std::vector{alpha, beta}, std::vector{beta, alpha}}) {
-    CommandGate gate(kRun, kVehicle, {kForceLimit});
-    gate.set_clients(clients);
-    gate.expect(0);
-    EXPECT_EQ(gate.awaited_client()->name, "alpha");
-    EXPECT_EQ(gate.offer(make_answer(0, -2.0), beta.peer), Verdict::kHeld);
-    EXPECT_EQ(gate.offer(make_answer(0, -1.0), alpha.peer), Verdict::kAccepted);
-  }
-}
-
-TEST_F(CommandGateTest, EqualStrengthsAndNamesAreStillOrdered) {
-  const ReadyClient first = {make_peer(1), "same", 5};
-  const ReadyClient second = {make_peer(2), "same", 5};
-  std::set<bus::PeerId> chosen;
-  for (const auto& clients : {std::vector{first, second}, std::vector{second, first}}) {
-    CommandGate gate(kRun, kVehicle, {kForceLimit});
-    gate.set_clients(clients);
-    gate.expect(0);
-    chosen.insert(gate.awaited_client()->peer);
-  }
-  EXPECT_EQ(chosen.size(), 1u);
-}
-
-TEST_F(CommandGateTest, StrengthDecidesOverTheWholeRangeOfItsType) {
-  const ReadyClient lowest = {make_peer(1), "a", std::numeric_limits<std::int32_t>::min()};
-  const ReadyClient highest = {make_peer(2), "b", std::numeric_limits<std::int32_t>::max()};
-  set_clients({lowest, highest});
-  EXPECT_EQ(gate_.awaited_client()->name, "b");
-}
-
-TEST_F(CommandGateTest, TheStandbysHeldAnswerFliesWhenTheStrongestIsSilent) {
-  set_clients({kStrong, kWeak});
-  gate_.offer(make_answer(0, -2.0), kWeakPeer);
-  EXPECT_TRUE(gate_.pass_over_silent_client());
-  ASSERT_TRUE(gate_.accepted());
-  EXPECT_EQ(*gate_.accepted(), make_answer(0, -2.0));
-  EXPECT_EQ(gate_.counters().take_overs(), 1u);
-  EXPECT_EQ(gate_.counters().superseded(), 0u);
-}
-
-TEST_F(CommandGateTest, TheNextClientIsAwaitedWhenTheStrongestIsSilent) {
-  start_with({kStrong, kWeak, kWeakest});
-  EXPECT_TRUE(gate_.pass_over_silent_client());
-  EXPECT_EQ(gate_.awaited_client()->name, "weak");
-  EXPECT_FALSE(gate_.accepted());
-  EXPECT_TRUE(gate_.pass_over_silent_client());
-  EXPECT_EQ(gate_.awaited_client()->name, "weakest");
-  EXPECT_EQ(gate_.counters().take_overs(), 0u) << "nobody has taken over yet";
-  EXPECT_EQ(gate_.offer(make_answer(0), kWeakestPeer), Verdict::kAccepted);
-  EXPECT_EQ(gate_.counters().take_overs(), 1u);
-  ASSERT_TRUE(gate_.take_over());
-  EXPECT_EQ(gate_.take_over()->from, "strong");
-  EXPECT_EQ(gate_.take_over()->to, "weakest");
-}
-
-TEST_F(CommandGateTest, WithoutAnotherClientThereIsNoTakeOver) {
-  EXPECT_FALSE(gate_.pass_over_silent_client());
-  EXPECT_EQ(gate_.counters().take_overs(), 0u);
-  EXPECT_EQ(gate_.awaited_client()->name, "strong");
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
-}
-
-TEST_F(CommandGateTest, ARefusedClientDoesNotTakeOver) {
-  set_clients({kStrong, kWeak});
-  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kWeakPeer);
-  EXPECT_FALSE(gate_.pass_over_silent_client());
-  EXPECT_EQ(gate_.awaited_client()->name, "strong");
-}
-
-TEST_F(CommandGateTest, NothingIsPassedOverOnceAnAnswerIsAccepted) {
-  set_clients({kStrong, kWeak});
-  gate_.offer(make_answer(0), kStrongPeer);
-  EXPECT_FALSE(gate_.pass_over_silent_client());
-  EXPECT_EQ(gate_.counters().take_overs(), 0u);
-}
-
-TEST_F(CommandGateTest, TheSilentClientIsSkippedUntilItAnswersAnAwaitedStep) {
-  start_with({kStrong, kWeak});
-  gate_.pass_over_silent_client();
-  gate_.offer(make_answer(0), kWeakPeer);
-  gate_.expect(1);
-  EXPECT_EQ(gate_.awaited_client()->name, "weak") << "no second wait for the silent one";
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kSuperseded);
-  EXPECT_EQ(gate_.awaited_client()->name, "weak") << "step 0 is not awaited any more";
-  EXPECT_EQ(gate_.offer(make_answer(1), kStrongPeer), Verdict::kAccepted);
-  ASSERT_TRUE(gate_.take_over());
-  EXPECT_EQ(gate_.take_over()->from, "weak");
-  EXPECT_EQ(gate_.take_over()->to, "strong");
-  gate_.expect(2);
-  EXPECT_EQ(gate_.awaited_client()->name, "strong");
-  EXPECT_EQ(gate_.counters().take_overs(), 2u) << "there and back";
-  EXPECT_FALSE(gate_.take_over());
-}
-
-TEST_F(CommandGateTest, TheStrongestIsAwaitedAgainAlsoIfItsAnswerCameSecond) {
-  start_with({kStrong, kWeak});
-  gate_.pass_over_silent_client();
-  gate_.offer(make_answer(0), kWeakPeer);
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kSuperseded);
-  gate_.expect(1);
-  EXPECT_EQ(gate_.awaited_client()->name, "strong");
-}
-
-TEST_F(CommandGateTest, TheFirstAnswerToAStepThatWentByIsLateAndTheOthersAreNot) {
-  set_clients({kStrong, kWeak});
-  gate_.expect(1);
-  gate_.expect(2);
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kLate);
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kDuplicate);
-  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kSuperseded);
-  EXPECT_EQ(gate_.offer(make_answer(1), make_peer(99)), Verdict::kWrongStep) << "a stranger";
-  EXPECT_EQ(gate_.offer(make_answer(1), kWeakPeer), Verdict::kLate);
-  EXPECT_FALSE(gate_.accepted());
-}
-
-TEST_F(CommandGateTest, MissesAreCountedInARowAndForgottenWithAnAnswer) {
-  set_clients({kStrong});
-  EXPECT_EQ(gate_.count_miss(), 1);
-  gate_.expect(1);
-  EXPECT_EQ(gate_.count_miss(), 2);
-  gate_.expect(2);
-  gate_.offer(make_answer(2), kStrongPeer);
-  gate_.expect(3);
-  EXPECT_EQ(gate_.count_miss(), 1);
-  set_clients({});
-  EXPECT_EQ(gate_.count_miss(), 0) << "nobody is awaited";
-}
-
-TEST_F(CommandGateTest, WhenAllAreSilentAnyOfThemMayComeBack) {
-  for (const auto& back : {kStrong, kWeak, kWeakest}) {
-    CommandGate gate(kRun, kVehicle, {kForceLimit});
-    gate.set_clients({kStrong, kWeak, kWeakest});
-    gate.expect(0);
-    while (gate.pass_over_silent_client()) {
-    }
-    EXPECT_EQ(gate.offer(make_answer(0), back.peer), Verdict::kAccepted) << back.name;
-  }
-}
-
-TEST_F(CommandGateTest, AStrongerClientThatJoinsFliesAfterItsFirstAnswer) {
-  set_clients({kWeak});
-  gate_.offer(make_answer(0), kWeakPeer);
-  gate_.expect(1);
-  set_clients({kWeak, kStrong});
-  EXPECT_EQ(gate_.offer(make_answer(1), kWeakPeer), Verdict::kAccepted) << "it may not see step 1";
-  EXPECT_EQ(gate_.offer(make_answer(1), kStrongPeer), Verdict::kSuperseded);
-  gate_.expect(2);
-  EXPECT_EQ(gate_.offer(make_answer(2), kWeakPeer), Verdict::kHeld);
-  EXPECT_EQ(gate_.offer(make_answer(2), kStrongPeer), Verdict::kAccepted);
-}
-
-TEST_F(CommandGateTest, ADistantClientThatJoinsMayAnswerAnEarlierStepFirst) {
-  set_clients({kWeak});
-  for (std::uint64_t step : {0, 1}) {
-    gate_.offer(make_answer(step), kWeakPeer);
-    gate_.expect(step + 1);
-  }
-  set_clients({kWeak, kStrong});
-  EXPECT_EQ(gate_.offer(make_answer(1), kStrongPeer), Verdict::kSuperseded);
-  EXPECT_EQ(gate_.awaited_client()->name, "strong");
-}
-
-TEST_F(CommandGateTest, AClientThatJoinsAloneIsAwaitedAtOnce) {
-  set_clients({kStrong});
-  gate_.offer(make_answer(0), kStrongPeer);
-  gate_.expect(1);
-  set_clients({});
-  set_clients({kWeak});
-  EXPECT_EQ(gate_.awaited_client()->name, "weak");
-  EXPECT_EQ(gate_.offer(make_answer(1), kWeakPeer), Verdict::kAccepted);
-}
-
-TEST_F(CommandGateTest, AHeldAnswerFliesWhenTheStrongerClientLeaves) {
-  set_clients({kStrong, kWeak});
-  gate_.offer(make_answer(0, -2.0), kWeakPeer);
-  set_clients({kWeak});
-  ASSERT_TRUE(gate_.accepted());
-  EXPECT_EQ(*gate_.accepted(), make_answer(0, -2.0));
-}
-
-TEST_F(CommandGateTest, AnswersOfAClientThatLeftAreCounted) {
-  set_clients({kStrong, kWeak});
-  gate_.offer(make_answer(0), kWeakPeer);
-  set_clients({kStrong});
-  gate_.offer(make_answer(0), kStrongPeer);
-  EXPECT_EQ(gate_.counters().superseded(), 1u);
-}
-
-TEST_F(CommandGateTest, SilenceAndRefusalsOutliveANewRosterAndARestartedClientBeginsAfresh) {
-  start_with({kStrong, kWeak});
-  gate_.pass_over_silent_client();
-  set_clients({kWeak, kStrong});
-  EXPECT_EQ(gate_.awaited_client()->name, "weak");
-  ReadyClient restarted = kStrong;
-  restarted.peer = make_peer(88);  // a new process is a new participant
-  set_clients({kWeak, restarted});
-  EXPECT_EQ(gate_.awaited_client()->name, "weak");
-  EXPECT_EQ(gate_.offer(make_answer(0), restarted.peer), Verdict::kAccepted);
-}
-
-TEST_F(CommandGateTest, WithoutClientsNothingIsAwaitedAndNothingRefused) {
-  set_clients({});
-  EXPECT_EQ(gate_.awaited_client(), std::nullopt);
-  EXPECT_EQ(gate_.refusal(), std::nullopt);
-  EXPECT_FALSE(gate_.pass_over_silent_client());
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kUnknownClient);
-}
-
-TEST_F(CommandGateTest, EveryRejectionHasAReason) {
+TEST(VerdictTest, EveryRejectionHasAReason) {
   std::set<std::string> texts;
   for (const Verdict verdict :
        {Verdict::kNotFinite, Verdict::kForceLimit, Verdict::kOtherRun, Verdict::kEarly,
@@ -851,17 +669,17 @@ TEST(CommandGatePropertyTest, InvalidAnswersChangeNoForceAndAreCounted) {
       }
       for (std::uint64_t i = junk.pick(3); i > 0; --i) {
         before.push_back({make_answer(step, -7.0), kStranger});
-        before.push_back({make_answer(step, -3.0), kWeakPeer});
-        after.push_back({make_answer(step, -2.0), kWeakestPeer});
-        after.push_back({strong_answer, kStrongPeer});
-        if (step > 0) before.push_back({make_answer(step - 1, -3.0), kWeakPeer});
+        before.push_back({make_answer(step, -3.0), kWeak.peer});
+        after.push_back({make_answer(step, -2.0), kWeakest.peer});
+        after.push_back({strong_answer, kStrong.peer});
+        if (step > 0) before.push_back({make_answer(step - 1, -3.0), kWeak.peer});
       }
       std::shuffle(before.begin(), before.end(), random);
       std::shuffle(after.begin(), after.end(), random);
       for (const Offer& offer : before) gate.offer(offer.command, offer.sender);
       ASSERT_FALSE(gate.accepted());
       ASSERT_EQ(gate.refusal(), std::nullopt);
-      ASSERT_EQ(gate.offer(strong_answer, kStrongPeer), Verdict::kAccepted);
+      ASSERT_EQ(gate.offer(strong_answer, kStrong.peer), Verdict::kAccepted);
       for (const Offer& offer : after) gate.offer(offer.command, offer.sender);
       ASSERT_TRUE(gate.accepted());
       ASSERT_EQ(*gate.accepted(), strong_answer);
@@ -909,85 +727,6 @@ TEST(CommandGatePropertyTest, EveryStepIsAnsweredAsLongAsOneOfTheChangingClients
       ASSERT_EQ(offered, step + 1 + sum_unapplied(gate.counters())) << "step " << step;
     }
   }
-}
-
-// --- gone ----------------------------------------------------------------------------------------
-
-ReadyClient make_gone(ReadyClient client) {
-  client.is_gone = true;
-  return client;
-}
-
-TEST_F(CommandGateTest, AClientThatIsGoneIsAwaitedOnlyIfNoOtherIsThere) {
-  set_clients({make_gone(kStrong), kWeak});
-  EXPECT_EQ(gate_.awaited_client()->name, "weak");
-  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kAccepted);
-  set_clients({make_gone(kStrong)});
-  EXPECT_EQ(gate_.awaited_client()->name, "strong");
-  EXPECT_TRUE(gate_.awaited_client()->is_gone);
-}
-
-TEST_F(CommandGateTest, AHeldAnswerIsTakenWhenTheAwaitedClientIsGone) {
-  set_clients({kStrong, kWeak});
-  EXPECT_EQ(gate_.offer(make_answer(0), kWeakPeer), Verdict::kHeld);
-  set_clients({make_gone(kStrong), kWeak});
-  EXPECT_TRUE(gate_.accepted());
-}
-
-TEST_F(CommandGateTest, OneThatIsGoneDoesNotTakeOver) {
-  set_clients({kStrong, make_gone(kWeak)});
-  EXPECT_FALSE(gate_.pass_over_silent_client());
-}
-
-TEST_F(CommandGateTest, ASilentClientIsAwaitedRatherThanOneThatIsGone) {
-  start_with({kStrong, kWeak});
-  EXPECT_TRUE(gate_.pass_over_silent_client());
-  EXPECT_FALSE(gate_.pass_over_silent_client());
-  set_clients({make_gone(kStrong), kWeak});
-  EXPECT_EQ(gate_.awaited_client()->name, "weak");
-}
-
-TEST_F(CommandGateTest, AnAnswerBringsAClientBackThatWasGone) {
-  set_clients({make_gone(kStrong), kWeak});
-  EXPECT_EQ(gate_.offer(make_answer(0), kStrongPeer), Verdict::kAccepted);
-  EXPECT_FALSE(gate_.awaited_client()->is_gone);
-}
-
-TEST_F(CommandGateTest, ARefusalEndsTheRunAtOnceIfAllOthersAreGone) {
-  set_clients({make_gone(kStrong), kWeak});
-  gate_.offer(make_faulted(0, ErrorCode::kFreeFall), kWeakPeer);
-  ASSERT_TRUE(gate_.refusal());
-  EXPECT_NE(gate_.refusal()->find("'weak'"), std::string::npos) << *gate_.refusal();
-  set_clients({make_gone(kStrong)});
-  EXPECT_FALSE(gate_.refusal()) << "it may come back";
-}
-
-TEST_F(CommandGateTest, ItCountsTheAnswersOfEachClientAndKnowsWhichAreMissing) {
-  const auto find = [](const CommandGate& gate, const bus::PeerId& sought) {
-    std::pair<std::uint64_t, bool> found;
-    gate.for_each_client([&](const bus::PeerId& peer, std::uint64_t answers, bool is_missing) {
-      if (peer == sought) found = {answers, is_missing};
-    });
-    return found;
-  };
-  using Known = std::pair<std::uint64_t, bool>;
-  CommandGate waiting(kRun, kVehicle, {kForceLimit});
-  waiting.set_clients({kStrong});
-  EXPECT_EQ(find(waiting, kStrongPeer), Known(0, false)) << "no state is published yet";
-  set_clients({kStrong, kWeak});
-  EXPECT_EQ(find(gate_, kStrongPeer), Known(0, true));
-  gate_.offer(make_answer(0), kStrongPeer);
-  gate_.offer(make_answer(0), kWeakPeer);  // superseded
-  EXPECT_EQ(find(gate_, kStrongPeer), Known(1, false));
-  EXPECT_EQ(find(gate_, kWeakPeer), Known(1, false));
-  gate_.expect(1);
-  gate_.expect(2);
-  gate_.offer(make_answer(1), kWeakPeer);  // late
-  EXPECT_EQ(find(gate_, kWeakPeer), Known(2, true));
-  OfferedAnswer wrong = make_answer(2);
-  wrong.run_id = kRun + 1;
-  gate_.offer(wrong, kWeakPeer);
-  EXPECT_EQ(find(gate_, kWeakPeer), Known(3, true)) << "refused, but its sender is there";
 }
 
 }  // namespace

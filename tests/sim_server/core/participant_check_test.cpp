@@ -5,30 +5,20 @@
 #include <algorithm>
 #include <chrono>
 #include <functional>
+#include <map>
+#include <sstream>
 
 #include "common/bus/topics.hpp"
 
 namespace sls::sim {
 namespace {
 
-using namespace std::chrono_literals;
-
 constexpr std::uint64_t kRun = 0xab;
 const std::string kScenario(64, 'a');
 
-/// Vehicles 0 and 1, rods of 1 m, steps of 10 ms: a stage of 2 s, then one of 3 s.
 config::Scenario make_scenario() {
   config::Scenario scenario;
   scenario.sha256 = kScenario;
-  scenario.sync.period_ns = 10'000'000;
-  scenario.vehicle.rod_length = 1.0;
-  scenario.vehicles.resize(2);
-  for (const std::int64_t seconds : {2, 3}) {
-    config::Stage stage;
-    stage.name = seconds == 2 ? "climb" : "stay";
-    stage.leave = config::LeaveAfter{seconds * 1'000'000'000};
-    scenario.mission.push_back(stage);
-  }
   return scenario;
 }
 
@@ -38,683 +28,382 @@ bus::PeerId make_peer(std::uint8_t number) {
   return peer;
 }
 
-sync::Member make_entry(std::uint8_t number, const std::string& name = "foo",
-                        ParticipantRole role = ParticipantRole::ROLE_CONTROLLER) {
+/// A ready controller "foo" of vehicles 0 and 1 with changes: "1 run=cd vehicles=7+8". Others have
+/// letters as hashes: "scenario=b".
+sync::Member parse_member(const std::string& text) {
+  std::istringstream words(text);
+  int number = 0;
+  words >> number;
   sync::Member entry;
-  entry.peer = make_peer(number);
-  entry.announcement.run_id(kRun);
-  entry.announcement.contract_sha256(bus::kContractSha256);
-  entry.announcement.role(role);
-  entry.announcement.name(name);
-  entry.announcement.host("box");
-  entry.announcement.vehicle_ids({0, 1});
-  entry.announcement.scenario_sha256(kScenario);
-  entry.announcement.ready(true);
+  Participant& announcement = entry.announcement;
+  entry.peer = make_peer(static_cast<std::uint8_t>(number));
   entry.ready_since = sync::Time(std::chrono::seconds(number));
+  announcement.run_id(kRun);
+  announcement.contract_sha256(bus::kContractSha256);
+  announcement.role(ParticipantRole::ROLE_CONTROLLER);
+  announcement.name("foo");
+  announcement.host("box");
+  announcement.vehicle_ids({0, 1});
+  announcement.scenario_sha256(kScenario);
+  announcement.ready(true);
+  std::string value;
+  const auto make_hash = [&] { return value.empty() ? value : std::string(64, value[0]); };
+  const std::map<std::string, std::function<void()>> changes = {
+      {"name", [&] { announcement.name(value); }},
+      {"role", [&] { announcement.role(static_cast<ParticipantRole>(std::stoi(value))); }},
+      {"run", [&] { announcement.run_id(std::stoull(value, nullptr, 16)); }},
+      {"contract", [&] { announcement.contract_sha256(make_hash()); }},
+      {"scenario", [&] { announcement.scenario_sha256(make_hash()); }},
+      {"library", [&] { announcement.library_sha256(make_hash()); }},
+      {"unready", [&] { announcement.ready(false); }},
+      {"done", [&] { announcement.done(true); }},
+      {"gone", [&] { entry.is_gone = true; }},
+      {"vehicles", [&] {
+         announcement.vehicle_ids().clear();
+         std::istringstream ids(value);
+         for (std::string id; std::getline(ids, id, '+');)
+           announcement.vehicle_ids().push_back(static_cast<std::uint32_t>(std::stoul(id)));
+       }}};
+  for (std::string word; std::getline(words, word, ' ');) {
+    if (word.empty()) continue;
+    const std::string key = word.substr(0, word.find('='));
+    value = word.substr(std::min(word.size(), key.size() + 1));
+    changes.at(key)();
+  }
   return entry;
 }
 
-class ParticipantCheckTest : public testing::Test {
- protected:
-  std::vector<std::string> look(std::chrono::milliseconds time = 0ms) {
-    neighbourhood_.now = sync::Time(1h + time);
-    if (are_matched_)
-      for (const sync::Member& entry : neighbourhood_.participants) {
-        if (entry.announcement.role() != ParticipantRole::ROLE_CONTROLLER) continue;
-        neighbourhood_.state_readers.insert(entry.peer);
-        neighbourhood_.command_writers.emplace(entry.peer, "'foo' (10.0.0.2)");
-      }
-    std::vector<std::string> texts;
-    for (const auto& [key, text] : check_.look(neighbourhood_)) texts.push_back(text);
-    return texts;
+/// An answer to a step with changes: "5 run=cd".
+OfferedAnswer parse_answer(const std::string& text) {
+  std::istringstream words(text);
+  OfferedAnswer answer;
+  answer.run_id = kRun;
+  answer.client_name = "foo";
+  words >> answer.step;
+  for (std::string word; words >> word;) {
+    const std::string key = word.substr(0, word.find('=')), value = word.substr(key.size() + 1);
+    if (key == "run") answer.run_id = std::stoull(value, nullptr, 16);
+    if (key == "vehicle") answer.vehicle_id = static_cast<std::uint32_t>(std::stoul(value));
+    if (key == "name") answer.client_name = value;
+    if (key == "stage") answer.answer.stage_name = value;
   }
-  std::vector<std::string> only(const std::string& text) { return {text}; }
+  return answer;
+}
 
-  static OfferedAnswer make_answer(std::uint64_t step, std::uint32_t stage = 0) {
-    OfferedAnswer answer;
-    answer.run_id = kRun;
-    answer.step = step;
-    answer.client_name = "foo";
-    answer.answer.memory.stage = stage;
-    return answer;
-  }
-  void take(const OfferedAnswer& answer, const model::ControllerMemory& returned = {},
-            Verdict verdict = Verdict::kAccepted) {
-    check_.answers().note_taken(answer, make_peer(1), verdict, returned, state_);
-  }
-  void reject(const OfferedAnswer& answer, Verdict verdict, std::uint64_t step) {
-    check_.answers().note_rejected(answer, make_peer(1), verdict, step);
+/// Plays events, separated by " | ". Participants have numbers, and answers come from the first.
+///
+///     members 1 run=cd, 2       their announcements (parse_member)
+///     network                   packets may be lost
+///     unmatched                 endpoints of controllers match only if the next two say so
+///     writer 1, reader 1        of sls/command and sls/state; also no-writer 1
+///     explained 1               another problem is reported already
+///     deadline 1 TEXT           its writer offers no DEADLINE
+///     server cd 7               another server's run and vehicle
+///     ahead 1                   its stamps are 5.04 s ahead of our clock; on-time: nobody's are
+///     take 5, copy 5, empty 5   an accepted answer, a copy, one for no vehicle
+///     wrong-step 500 3          the answer 3 is rejected while step 500 is awaited, for this or
+///                               another cause
+///     look 4000 TEXT            all mistakes after 4 s, or none
+///     due 4000                  when the next look is due
+///     admits 1 library=c, 2: 1  which of them may take part
+///     rejections TEXT           the rejected answers of participant 1
+class CheckEventsTest : public testing::Test {
+ protected:
+  void play(const std::string& events) {
+    for (std::size_t begin = 0, end = 0; end != std::string::npos; begin = end + 3) {
+      end = events.find(" | ", begin);
+      const std::string event = events.substr(begin, end - begin);
+      SCOPED_TRACE(event);
+      const std::string verb = event.substr(0, event.find(' '));
+      play_one(verb, event.substr(std::min(event.size(), verb.size() + 1)));
+    }
   }
 
   ParticipantCheck check_{kRun, make_scenario(), {0, 1}};
+
+ private:
+  static std::vector<sync::Member> parse_members(const std::string& text) {
+    std::vector<sync::Member> members;
+    std::istringstream parts(text);
+    for (std::string part; std::getline(parts, part, ',');) members.push_back(parse_member(part));
+    return members;
+  }
+
+  static sync::Time at(int time_ms) {
+    return sync::Time(std::chrono::hours(1) + std::chrono::milliseconds(time_ms));
+  }
+
+  std::string look(int time_ms) {
+    neighbourhood_.now = at(time_ms);
+    for (const sync::Member& member : neighbourhood_.participants)
+      if (are_matched_ && member.announcement.role() == ParticipantRole::ROLE_CONTROLLER) {
+        neighbourhood_.state_readers.insert(member.peer);
+        neighbourhood_.command_writers.emplace(member.peer, kWriter);
+      }
+    std::string texts;
+    for (const auto& [key, text] : check_.look(neighbourhood_))
+      texts += (texts.empty() ? "" : "; ") + text;
+    return texts.empty() ? "none" : texts;
+  }
+
+  void play_one(const std::string& verb, const std::string& rest) {
+    const std::string text = rest.substr(std::min(rest.size(), rest.find(' ') + 1));
+    const auto peer = [&] { return make_peer(static_cast<std::uint8_t>(std::stoi(rest))); };
+    const auto take = [&](Verdict verdict) {
+      check_.answers().note_taken(parse_answer(rest), make_peer(1), verdict);
+    };
+    const std::map<std::string, std::function<void()>> events = {
+        {"members", [&] { neighbourhood_.participants = parse_members(rest); }},
+        {"network", [&] { neighbourhood_.is_on_network = true; }},
+        {"unmatched", [&] { are_matched_ = false; }},
+        {"writer", [&] { neighbourhood_.command_writers[peer()] = kWriter; }},
+        {"no-writer", [&] { neighbourhood_.command_writers.erase(peer()); }},
+        {"reader", [&] { neighbourhood_.state_readers.insert(peer()); }},
+        {"explained", [&] { neighbourhood_.explained.insert(peer()); }},
+        {"deadline", [&] { neighbourhood_.missing_deadlines[peer()] = text; }},
+        {"server",
+         [&] {
+           neighbourhood_.other_runs.insert(std::stoull(rest, nullptr, 16));
+           neighbourhood_.other_vehicles.insert(static_cast<std::uint32_t>(std::stoul(text)));
+         }},
+        {"ahead", [&] { neighbourhood_.stamps_ahead_s[peer()] = 5.04; }},
+        {"on-time", [&] { neighbourhood_.stamps_ahead_s.clear(); }},
+        {"take", [&] { take(Verdict::kAccepted); }},
+        {"copy", [&] { take(Verdict::kDuplicate); }},
+        {"empty", [&] { check_.answers().note_empty(make_peer(1), std::stoull(rest)); }},
+        {"rejections",
+         [&] { EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)), rest); }},
+        {"due", [&] { EXPECT_EQ(check_.next_due(), at(std::stoi(rest))); }},
+        {"look", [&] { EXPECT_EQ(look(std::stoi(rest)), text); }},
+        {"admits", [&] {
+           std::string admitted;
+           const std::size_t colon = rest.find(": ");
+           for (const auto& member : check_.admit_controllers(parse_members(rest.substr(0, colon))))
+             admitted += (admitted.empty() ? "" : ", ") + std::to_string(member.peer.bytes[0]);
+           EXPECT_EQ(admitted, rest.substr(colon + 2));
+         }}};
+    const std::map<std::string, Verdict> verdicts = {{"other-run", Verdict::kOtherRun},
+                                                     {"unknown-vehicle", Verdict::kUnknownVehicle},
+                                                     {"wrong-step", Verdict::kWrongStep},
+                                                     {"early", Verdict::kEarly},
+                                                     {"contradiction", Verdict::kContradiction}};
+    if (const auto verdict = verdicts.find(verb); verdict != verdicts.end())
+      check_.answers().note_rejected(parse_answer(text), make_peer(1), verdict->second,
+                                     std::stoull(rest));
+    else
+      events.at(verb)();
+  }
+
+  const std::string kWriter = "'foo' (10.0.0.2)";
   Neighbourhood neighbourhood_;
   bool are_matched_ = true;  // the endpoints of every controller
-  model::Measurement state_;
 };
 
-const std::string kFoo = "controller 'foo' on box: ";
+struct Row {
+  std::string name, events;
+};
 
-// --- announcements -------------------------------------------------------------------------------
+class ParticipantCheckTest : public CheckEventsTest, public testing::WithParamInterface<Row> {};
 
-TEST_F(ParticipantCheckTest, OursDoNothingWrong) {
-  neighbourhood_.participants = {make_entry(1),
-                                 make_entry(2, "tape", ParticipantRole::ROLE_RECORDER)};
-  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
-  for (int i = 0; i < 10; ++i) EXPECT_EQ(look(i * 1s), std::vector<std::string>());
-  EXPECT_EQ(check_.admit_controllers(neighbourhood_.participants).size(), 2u);
+const std::string kFoo = "controller 'foo' on box: ", kField = kFoo + "sls/participant ",
+                  kCommand = kFoo + "sls/command ", kB(64, 'b'), kC(64, 'c');
+const std::string kAhead =
+    "sls/command source timestamp: expected none in the future, got 5.0 s ahead of our clock";
+const std::string kDeadline = "sls/command of 'foo': DEADLINE";
+const std::string kOtherRun = "run_id: expected 00000000000000ab, got 00000000000000cd";
+
+const Row kRows[] = {
+    // --- announcements
+    {"OursDoNothingWrong",
+     "members 1, 2 name=tape role=1 | writer 1 | look 0 none | look 1000 none | look 4000 none | "
+     "look 9000 none | admits 1, 2 name=tape role=1: 1, 2"},
+    {"AnotherContractIsNamedAtOnceAndNotAdmitted",
+     "members 1 contract=1 vehicles=99, 2 name=tape role=1 contract= | look 0 " + kField +
+         "contract_sha256: expected " + bus::kContractSha256 + ", got " + std::string(64, '1') +
+         "; recorder 'tape' on box: sls/participant contract_sha256: expected " +
+         bus::kContractSha256 + ", got none | admits 1 contract=1: "},
+    {"AnUnknownRunIsReportedOnceItLasts",
+     "members 1 run=cd | look 0 none | look 3900 none | look 4000 " + kField + kOtherRun +
+         " | look 9000 " + kField + kOtherRun + " | members 1 | look 10000 none"},
+    {"ARunOfZeroIsNamedOnceItLastsIfItCannotWaitForAnotherServer",
+     "members 1 run=0 | look 0 none | look 4000 " + kField +
+         "run_id: expected 00000000000000ab, got 0 | members 1 run=0 vehicles=7 | look 5000 none | "
+         "members 1 run=0 vehicles= | look 6000 none | look 10000 " +
+         kField + "run_id: expected 00000000000000ab, got 0"},
+    {"AControllerOfAnotherServerIsNotOurs",
+     "members 1 run=cd vehicles=7 scenario=, 2 run=0 vehicles=8 | server cd 7 | deadline 1 " +
+         kDeadline + " | deadline 2 " + kDeadline + " | look 0 none | look 5000 none"},
+    {"UnknownVehiclesAreReportedOnceTheyLast",
+     "members 1 vehicles=1+7+8+20 | server cd 20 | look 0 none | look 4000 " + kField +
+         "vehicle_ids: expected 0-1, got 7-8 | members 1 vehicles= | look 5000 none | look 9000 " +
+         kField + "vehicle_ids: expected 0-1, got none"},
+    {"AnotherScenarioIsNamedWithBoth", "members 1 scenario=b | look 0 " + kField +
+                                           "scenario_sha256: expected " + kScenario + ", got " +
+                                           kB},
+    {"ARoleThatIsNotDefinedIsNamed",
+     "members 1 role=7 | look 0 participant 'foo' on box: sls/participant role: expected "
+     "controller or recorder, got 7"},
+    {"ARecorderThatWritesCommandsIsNamed",
+     "members 1 role=1 | look 0 none | writer 1 | look 0 recorder 'foo' on box: sls/participant "
+     "role: expected controller, as it writes sls/command, got recorder"},
+    {"AClientThatIsNeverReadyIsNamedWithItsEndpoints",
+     "members 1 unready | look 0 none | look 3900 none | look 4000 " + kField +
+         "ready: expected true, as its endpoints are matched, got false | members 1 | "
+         "look 5000 none"},
+    {"AMissingEndpointIsNamed",
+     "unmatched | members 1 | look 0 none | look 4000 " + kFoo +
+         "expected a reader of sls/state and a writer of sls/command, got none | writer 1 | "
+         "look 5000 none | look 9000 " +
+         kFoo +
+         "expected a reader of sls/state, got none | no-writer 1 | reader 1 | "
+         "look 10000 none | look 14000 " +
+         kFoo + "expected a writer of sls/command, got none | explained 1 | look 15000 none"},
+    {"EndpointsAreWaitedForLongerOnANetwork",
+     "unmatched | network | members 1 | look 0 none | look 14900 none | look 15000 " + kFoo +
+         "expected a reader of sls/state and a writer of sls/command, got none"},
+    {"ANameThatIsNotUtf8IsNamed",
+     "members 1 name=f\xfc\xfc, 2 name=f\xc3\xbc | look 0 controller 'f\\xfc\\xfc' on box: "
+     "sls/participant name: expected UTF-8, got 'f\\xfc\\xfc'"},
+    {"NamesAreShownPrintable",
+     "members 1 name=evil\n\x1b[2J run=0 | look 0 none | look 4000 controller 'evil\\x0a\\x1b[2J' "
+     "on box: sls/participant run_id: expected 00000000000000ab, got 0"},
+
+    // --- strangers
+    {"AWriterOfCommandsWithoutAnAnnouncementIsNamedOnceThatLasts",
+     "writer 1 | look 0 none | due 4000 | look 3900 none | look 4000 'foo' (10.0.0.2): writes "
+     "sls/command: expected an announcement in sls/participant, got none | explained 1 | "
+     "look 5000 none"},
+    {"AnAnnouncementIsWaitedForLongerOnANetwork",
+     "writer 1 | network | look 0 none | look 14900 none | look 15000 'foo' (10.0.0.2): writes "
+     "sls/command: expected an announcement in sls/participant, got none | members 1 | "
+     "look 16000 none"},
+    {"AMissingDeadlineExplainsThatNoWriterMatches", "members 1 | deadline 1 " + kDeadline +
+                                                        " | look 0 " + kDeadline + " | look 2000 " +
+                                                        kDeadline},
+    {"AMissingDeadlineIsReportedOnlyOfOurControllers",
+     "deadline 1 " + kDeadline + " | look 0 none | look 4000 " + kDeadline +
+         " | members 1 | "
+         "look 5000 " +
+         kDeadline + " | members 1 run=cd | look 6000 none | look 10000 " + kDeadline + "; " +
+         kField + kOtherRun},
+
+    // --- libraries
+    {"AnotherLibraryThanThatOfTheFirstIsRefused",
+     "members 2 name=second, 1 name=first library=c | "
+     "admits 2 name=second, 1 name=first library=c: 1 | look 0 controller 'second' on box: "
+     "sls/participant library_sha256: expected " +
+         kC +
+         " (that of 'first'), got none; it is "
+         "refused | admits 2: 2 | admits 2, 3 library=c: 2"},
+    {"ALibraryBindsTheOthersOfItsVehicleIfItsClientCanFly",
+     "admits 1 library=c vehicles=0, 2: 1 | admits 1 library=c vehicles=0, 2 vehicles=1: 1, 2 | "
+     "admits 1 library=c vehicles=0 unready, 2 vehicles=0: 2 | "
+     "admits 1 library=c vehicles=0 scenario=b, 2 vehicles=0: 2"},
+    {"TheLibraryOfAClientThatIsGoneBindsNobody",
+     "members 1 library=c gone, 2 library=d | admits 1 library=c gone, 2 library=d: 2 | "
+     "look 0 none"},
+    {"TheLibraryThatHasFlownStaysInForceWhenItsClientIsGone",
+     "admits 1 library=c: 1 | take 0 | admits 4 library=d:  | admits 3 library=c, 4 library=d: 3"},
+
+    // --- answers
+    {"AnswersThatAreAllRejectedAreNamedWithCauseAndCount",
+     "members 1 | other-run 5 5 run=cd | other-run 5 5 run=cd | other-run 5 5 run=cd | "
+     "rejections  (3 of its answers rejected, none taken: " +
+         kOtherRun +
+         ") | look 0 none | "
+         "look 4000 " +
+         kFoo + "sls/command: 3 answers rejected, none taken: " + kOtherRun +
+         " | take 5 | look 4100 none | rejections "},
+    {"CausesOfRejection",
+     "members 1 | look 0 none | unknown-vehicle 5 5 vehicle=9 | rejections  (1 of its answers "
+     "rejected, none taken: vehicle_id: expected 0-1, got 9) | wrong-step 500 3 | rejections  (2 "
+     "of its answers rejected, none taken: step: expected 500, got 3)"},
+    {"AFewAnswersToOldStepsAreNoMistake",
+     "members 1 | wrong-step 500 3 | wrong-step 500 4 | look 0 none | look 5000 none | "
+     "wrong-step 500 5 | look 6000 " +
+         kFoo + "sls/command: 3 answers rejected, none taken: step: expected 500, got 5"},
+    {"AnswersToStepsThatAreNotPublishedAreNamedAtOnceAndForATime",
+     "members 1 | wrong-step 12 13 | look 0 " + kCommand +
+         "step: expected at most 12, the last published, got 13 | look 2000 " + kCommand +
+         "step: expected at most 12, the last published, got 13 | look 2001 none"},
+    {"AnAnswerThatCameBeforeItsStateNamesTheStepBefore",
+     "members 1 | early 13 13 | look 0 " + kCommand +
+         "step: expected at most 12, the last published, got 13"},
+    {"AnAnswerBeforeAnyStateIsNamed", "members 1 | early 0 0 | look 0 " + kCommand +
+                                          "step: expected none before a state is published, got 0"},
+    {"TwoAnswersToOneStepAreNamed", "members 1 | take 12 | contradiction 12 12 | look 0 " +
+                                        kCommand +
+                                        "step 12: expected one answer, got two that differ"},
+    {"AnAnswerForNoVehicleIsNamed",
+     "members 1 | empty 3 | look 0 " + kCommand +
+         "vehicles at step 3: expected at least one answer, got none | look 3000 none"},
+    {"AnswersOfAClientUnderAnotherNameAreNamed",
+     "members 1 | take 0 | look 0 none | take 1 name=bar | look 0 " + kCommand +
+         "client_name: expected 'foo', as announced, got 'bar' | look 9000 " + kCommand +
+         "client_name: expected 'foo', as announced, got 'bar' | members | look 10000 none"},
+    {"AStampInTheFutureIsNamedForATime",
+     "members 1, 2 run=cd | server cd 7 | ahead 1 | ahead 2 | look 0 " + kFoo + kAhead +
+         " | on-time | look 2000 " + kFoo + kAhead + " | look 2001 none"},
+    {"AMistakeInAnswersOfAnUnannouncedWriterNamesItAsDiscoveryDoes",
+     "writer 1 | ahead 1 | look 0 'foo' (10.0.0.2): " + kAhead},
+    {"AStageNameThatIsNotUtf8IsNamed",
+     "members 1 | take 4 stage=h\xf6he | look 0 " + kCommand +
+         "reference.stage_name at step 4: "
+         "expected UTF-8, got 'h\\xf6he' | take 5 stage=h\xf6he | look 2000 " +
+         kCommand +
+         "reference.stage_name at step 4: expected UTF-8, got 'h\\xf6he' | take 6 stage=h\xf6he | "
+         "look 4000 " +
+         kCommand +
+         "reference.stage_name at step 4: expected UTF-8, got 'h\\xf6he' | "
+         "take 7 stage=h\xc3\xb6he | look 7000 none"},
+};
+
+TEST_P(ParticipantCheckTest, FindsTheMistakesOfTheTable) { play(GetParam().events); }
+
+INSTANTIATE_TEST_SUITE_P(Rows, ParticipantCheckTest, testing::ValuesIn(kRows),
+                         [](const auto& row) { return row.param.name; });
+
+using ParticipantSeriesTest = CheckEventsTest;
+
+TEST_F(ParticipantSeriesTest, AClientThatIsDoneAndStillAnswersIsNamed) {
+  play("members 1 done | take 0 | look 0 none | look 500 none");
+  for (int step = 1; step < 25; ++step)
+    play("take " + std::to_string(step) + " | look " + std::to_string(500 + step * 200) +
+         (step < 21 ? " none"
+                    : " " + kField + "done: expected false, as it still answers, got true"));
+  play("look 9000 none");
 }
 
-TEST_F(ParticipantCheckTest, AnotherContractIsNamedAtOnceAndNotAdmitted) {
-  auto controller = make_entry(1), recorder = make_entry(2, "tape", ParticipantRole::ROLE_RECORDER);
-  controller.announcement.contract_sha256(std::string(64, '1'));
-  recorder.announcement.contract_sha256("");
-  controller.announcement.vehicle_ids({99});  // may have another meaning there
-  neighbourhood_.participants = {controller, recorder};
-  const std::string field = "sls/participant contract_sha256: expected ";
-  EXPECT_EQ(look(), (std::vector<std::string>{
-                        kFoo + field + bus::kContractSha256 + ", got " + std::string(64, '1'),
-                        "recorder 'tape' on box: " + field + bus::kContractSha256 + ", got none"}));
-  EXPECT_TRUE(check_.admit_controllers({controller}).empty());
-  EXPECT_TRUE(ParticipantCheck::admit_recorders({recorder}).empty());
-}
-
-TEST_F(ParticipantCheckTest, AnUnknownRunIsReportedOnceItLasts) {
-  auto entry = make_entry(1);
-  entry.announcement.run_id(0xcd);
-  neighbourhood_.participants = {entry};
-  EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(1s).empty());
-  const auto expected =
-      only(kFoo + "sls/participant run_id: expected 00000000000000ab, got 00000000000000cd");
-  EXPECT_EQ(look(1400ms), expected);
-  EXPECT_EQ(look(9s), expected);
-  neighbourhood_.participants = {make_entry(1)};
-  EXPECT_TRUE(look(10s).empty());
-}
-
-TEST_F(ParticipantCheckTest, ARunOfZeroIsNamedOnceItLasts) {
-  auto entry = make_entry(1);
-  entry.announcement.run_id(0);
-  neighbourhood_.participants = {entry};
-  EXPECT_TRUE(look().empty());
-  const auto expected = only(kFoo + "sls/participant run_id: expected 00000000000000ab, got 0");
-  EXPECT_EQ(look(1s), expected);
-  neighbourhood_.participants[0].announcement.vehicle_ids({7});
-  EXPECT_TRUE(look(2s).empty()) << "it may wait for another server";
-  neighbourhood_.participants[0].announcement.vehicle_ids({});
-  look(3s);
-  EXPECT_EQ(look(4s), expected);
-}
-
-TEST_F(ParticipantCheckTest, AControllerOfAnotherServerIsNotOurs) {
-  auto other = make_entry(1), waits = make_entry(2);
-  other.announcement.run_id(0xcd);
-  other.announcement.vehicle_ids({7});
-  other.announcement.scenario_sha256("");
-  waits.announcement.run_id(0);
-  waits.announcement.vehicle_ids({8});
-  neighbourhood_.participants = {other, waits};
-  neighbourhood_.other_runs = {0xcd};
-  neighbourhood_.other_vehicles = {7};
-  for (const std::uint8_t number : {1, 2})
-    neighbourhood_.missing_deadlines[make_peer(number)] = "sls/command of 'foo': DEADLINE: …";
-  look();
-  EXPECT_TRUE(look(5s).empty());
-}
-
-TEST_F(ParticipantCheckTest, UnknownVehiclesAreReportedOnceTheyLast) {
-  auto entry = make_entry(1);
-  entry.announcement.vehicle_ids({1, 7, 8, 20});
-  neighbourhood_.other_vehicles = {20};
-  neighbourhood_.participants = {entry};
-  EXPECT_TRUE(look().empty());
-  EXPECT_EQ(look(1s), only(kFoo + "sls/participant vehicle_ids: expected 0-1, got 7-8"));
-  entry.announcement.vehicle_ids({});
-  neighbourhood_.participants = {entry};
-  look(2s);
-  EXPECT_EQ(look(3s), only(kFoo + "sls/participant vehicle_ids: expected 0-1, got none"));
-}
-
-TEST_F(ParticipantCheckTest, AnotherScenarioIsNamedWithBoth) {
-  auto entry = make_entry(1);
-  entry.announcement.scenario_sha256(std::string(64, 'b'));
-  neighbourhood_.participants = {entry};
-  EXPECT_EQ(look(), only(kFoo + "sls/participant scenario_sha256: expected " + kScenario +
-                         ", got " + std::string(64, 'b')));
-}
-
-TEST_F(ParticipantCheckTest, OnANetworkARunIsAskedForOnceTheClientHasParametersAndStatus) {
-  auto entry = make_entry(1), earlier = make_entry(2);
-  entry.announcement.run_id(0);
-  earlier.announcement.run_id(0xcd);
-  neighbourhood_.is_on_network = true;
-  neighbourhood_.participants = {entry, earlier};
-  EXPECT_TRUE(look().empty());
-  neighbourhood_.informed = {make_peer(2)};
-  EXPECT_TRUE(look(5s).empty());
-  EXPECT_TRUE(look(7400ms).empty());
-  EXPECT_EQ(look(7500ms).size(), 1u);  // of the client that has them
-  EXPECT_EQ(look(14900ms).size(), 1u);
-  EXPECT_EQ(look(15s).size(), 2u);
-}
-
-TEST_F(ParticipantCheckTest, ARoleThatIsNotDefinedIsNamed) {
-  neighbourhood_.participants = {make_entry(1, "foo", static_cast<ParticipantRole>(7))};
-  EXPECT_EQ(look(), only("participant 'foo' on box: sls/participant role: expected controller or "
-                         "recorder, got 7"));
-}
-
-TEST_F(ParticipantCheckTest, ARecorderThatWritesCommandsIsNamed) {
-  neighbourhood_.participants = {make_entry(1, "foo", ParticipantRole::ROLE_RECORDER)};
-  EXPECT_TRUE(look().empty());
-  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
-  EXPECT_EQ(look(), only("recorder 'foo' on box: sls/participant role: expected controller, as it "
-                         "writes sls/command, got recorder"));
-}
-
-TEST_F(ParticipantCheckTest, AClientThatIsNeverReadyIsNamedWithItsEndpoints) {
-  auto entry = make_entry(1);
-  entry.announcement.ready(false);
-  neighbourhood_.participants = {entry};
-  EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(900ms).empty());
-  EXPECT_EQ(look(1s), only(kFoo + "sls/participant ready: expected true, as its endpoints are "
-                                  "matched, got false"));
-  neighbourhood_.participants[0].announcement.ready(true);
-  EXPECT_TRUE(look(2s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AMissingEndpointIsNamed) {
-  are_matched_ = false;
-  neighbourhood_.participants = {make_entry(1)};
-  look();
-  EXPECT_EQ(look(1s), only(kFoo + "expected a reader of sls/state and a writer of sls/command, got "
-                                  "none"));
-  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
-  EXPECT_TRUE(look(2s).empty());
-  EXPECT_EQ(look(3s), only(kFoo + "expected a reader of sls/state, got none"));
-  neighbourhood_.command_writers.clear();
-  neighbourhood_.state_readers = {make_peer(1)};
-  look(4s);
-  EXPECT_EQ(look(5s), only(kFoo + "expected a writer of sls/command, got none"));
-  neighbourhood_.explained = {make_peer(1)};  // its writer has other QoS: already reported
-  EXPECT_TRUE(look(6s).empty());
-}
-
-TEST_F(ParticipantCheckTest, EndpointsAreWaitedForLongerOnANetwork) {
-  are_matched_ = false;
-  neighbourhood_.is_on_network = true;
-  neighbourhood_.participants = {make_entry(1)};
-  look();
-  EXPECT_TRUE(look(14900ms).empty());
-  EXPECT_EQ(look(15s).size(), 1u);
-}
-
-TEST_F(ParticipantCheckTest, OnANetworkAClientThatIsNeverReadyIsNamedWithin3sOfItsNews) {
-  neighbourhood_.is_on_network = true;
-  neighbourhood_.participants = {make_entry(1)};
-  neighbourhood_.participants[0].announcement.ready(false);
-  look();
-  EXPECT_TRUE(look(3s).empty());  // it may not know the server's endpoints yet
-  neighbourhood_.informed = {make_peer(1)};
-  EXPECT_TRUE(look(4s).empty());
-  EXPECT_TRUE(look(6400ms).empty());
-  EXPECT_EQ(look(6500ms).size(), 1u);
-}
-
-TEST_F(ParticipantCheckTest, ANameThatIsNotUtf8IsNamed) {
-  neighbourhood_.participants = {make_entry(1, "f\xfc\xfc"), make_entry(2, "f\xc3\xbc")};
-  EXPECT_EQ(look(), only("controller 'f\\xfc\\xfc' on box: sls/participant name: expected UTF-8, "
-                         "got 'f\\xfc\\xfc'"));
-}
-
-TEST_F(ParticipantCheckTest, NamesAreShownPrintable) {
-  auto entry = make_entry(1, "evil\n\x1b[2J");
-  entry.announcement.run_id(0);
-  neighbourhood_.participants = {entry};
-  look();
-  const auto found = look(1s);
-  ASSERT_EQ(found.size(), 1u);
-  EXPECT_EQ(found[0].find_first_of("\n\x1b"), std::string::npos) << found[0];
-}
-
-TEST_F(ParticipantCheckTest, TwoClientsOfOneNameAndStrengthAreNamed) {
-  auto first = make_entry(1), second = make_entry(2);
-  second.announcement.host("desk");
-  second.announcement.vehicle_ids({1});
-  const auto later = sync::Time(1h + 500ms);
-  first.heard = later;
-  second.heard = second.ready_since = later - 400ms;
-  neighbourhood_.participants = {second, first};
-  EXPECT_EQ(look(600ms),
-            only("controller 'foo' on desk: sls/participant name and strength: expected others "
-                 "than those of controller 'foo' on box, got the same: which of the two flies is "
-                 "arbitrary"));
-  EXPECT_TRUE(look(3s).empty()) << "the first one is silent";
-
-  const auto expect_none = [&](const std::function<void(Participant&)>& change) {
-    auto other = second;
-    change(other.announcement);
-    neighbourhood_.participants = {first, other};
-    EXPECT_TRUE(look(600ms).empty());
-  };
-  expect_none([](Participant& other) { other.name("bar"); });
-  expect_none([](Participant& other) { other.strength(1); });
-  expect_none([](Participant& other) {
-    other.vehicle_ids({2});
-    other.run_id(0xcd);
-  });
-  expect_none([](Participant& other) { other.ready(false); });
-  expect_none([](Participant& other) { other.done(true); });
-  first.announcement.vehicle_ids({0});
-  expect_none([](Participant&) {});  // the other one flies vehicle 1
-  first.announcement.vehicle_ids({0, 1});
-  first.announcement.ready(false);
-  expect_none([](Participant&) {});
-  first.announcement.ready(true);
-  second.announcement.contract_sha256("");
-  neighbourhood_.participants = {first, second};
-  const auto found = look(600ms);
-  ASSERT_EQ(found.size(), 1u);
-  EXPECT_NE(found[0].find("contract_sha256"), std::string::npos) << "it cannot fly anyway";
-}
-
-/// It stays listed until its lease ends.
-TEST_F(ParticipantCheckTest, AClientThatReplacesAKilledOneOfTheSameNameIsNoMistake) {
-  auto killed = make_entry(1), next = make_entry(2);
-  killed.heard = sync::Time(1h);
-  next.heard = next.ready_since = killed.heard + 100ms;
-  neighbourhood_.participants = {killed, next};
-  for (const auto time : {100ms, 600ms, 1100ms, 5000ms}) EXPECT_TRUE(look(time).empty());
-}
-
-/// They may announce themselves only once.
-TEST_F(ParticipantCheckTest, TwoClientsOfOneNameThatAnswerTheSameStepAreNamed) {
-  auto first = make_entry(1), second = make_entry(2);
-  second.ready_since = first.ready_since + 1h;
-  neighbourhood_.participants = {first, second};
-  EXPECT_TRUE(look().empty());
-  check_.answers().note_superseded(make_peer(1), make_peer(2));
-  EXPECT_EQ(look(100ms).size(), 1u);
-  EXPECT_EQ(look(2s).size(), 1u);
-  EXPECT_TRUE(look(2200ms).empty());
-  check_.answers().note_superseded(make_peer(2), make_peer(1));
-  EXPECT_EQ(look(3s).size(), 1u) << "whichever of them was first";
-}
-
-// --- strangers -----------------------------------------------------------------------------------
-
-TEST_F(ParticipantCheckTest, AWriterOfCommandsWithoutAnAnnouncementIsNamedOnceThatLasts) {
-  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
-  EXPECT_TRUE(look().empty());
-  EXPECT_EQ(check_.next_due(), sync::Time(1h + 1s));
-  EXPECT_TRUE(look(900ms).empty());
-  EXPECT_EQ(look(1s), only("'foo' (10.0.0.2): writes sls/command: expected an announcement in "
-                           "sls/participant, got none"));
-  neighbourhood_.explained = {make_peer(1)};  // its announcement does not fit: already reported
-  EXPECT_TRUE(look(2s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AnAnnouncementIsWaitedForUntilTheClientHasParametersAndStatus) {
-  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
-  neighbourhood_.announcement_writers = {make_peer(1)};
-  EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(3900ms).empty());  // a busy machine may have lost them
-  EXPECT_EQ(look(4s).size(), 1u);
-  neighbourhood_.informed = {make_peer(1)};
-  EXPECT_TRUE(look(5s).empty());
-  EXPECT_TRUE(look(5900ms).empty());
-  EXPECT_EQ(look(6s).size(), 1u);
-}
-
-TEST_F(ParticipantCheckTest, AnAnnouncementIsWaitedForLongerOnANetwork) {
-  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
-  neighbourhood_.is_on_network = true;
-  EXPECT_TRUE(look().empty());
-  EXPECT_TRUE(look(3900ms).empty());
-  EXPECT_EQ(look(4s).size(), 1u);  // it has no writer for announcements
-  neighbourhood_.announcement_writers = {make_peer(1)};
-  EXPECT_TRUE(look(5s).empty());
-  EXPECT_TRUE(look(14900ms).empty());  // time for several losses in a row
-  EXPECT_EQ(look(15s).size(), 1u);
-  neighbourhood_.participants = {make_entry(1, "foo")};
-  EXPECT_TRUE(look(16s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AMissingDeadlineExplainsThatNoWriterMatches) {
-  neighbourhood_.participants = {make_entry(1)};
-  neighbourhood_.missing_deadlines[make_peer(1)] = "sls/command of 'foo': DEADLINE";
-  EXPECT_EQ(look(), only("sls/command of 'foo': DEADLINE"));
-  EXPECT_EQ(look(2s), only("sls/command of 'foo': DEADLINE"));
-}
-
-TEST_F(ParticipantCheckTest, AMissingDeadlineIsReportedOnlyOfOurControllers) {
-  neighbourhood_.missing_deadlines[make_peer(1)] = "sls/command of 'foo': DEADLINE";
-  EXPECT_TRUE(look().empty());  // without an announcement its vehicles are unknown
-  EXPECT_EQ(look(1s), only("sls/command of 'foo': DEADLINE"));
-  neighbourhood_.missing_deadlines = {{make_peer(2), "sls/command of 'bar': DEADLINE"}};
-  neighbourhood_.participants = {make_entry(2, "bar")};
-  EXPECT_EQ(look(2s), only("sls/command of 'bar': DEADLINE"));
-  neighbourhood_.participants[0].announcement.run_id(0xcd);  // of the run before, perhaps
-  EXPECT_TRUE(look(3s).empty());
-  const auto found = look(4s);
-  EXPECT_NE(std::find(found.begin(), found.end(), "sls/command of 'bar': DEADLINE"), found.end());
-}
-
-// --- libraries -----------------------------------------------------------------------------------
-
-TEST_F(ParticipantCheckTest, AnotherLibraryThanThatOfTheFirstIsRefused) {
-  auto first = make_entry(1, "first"), second = make_entry(2, "second");
-  first.announcement.library_sha256(std::string(64, 'c'));
-  neighbourhood_.participants = {second, first};
-  const auto admitted = check_.admit_controllers(neighbourhood_.participants);
-  ASSERT_EQ(admitted.size(), 1u);
-  EXPECT_EQ(admitted[0].peer, first.peer);
-  EXPECT_EQ(look(), only("controller 'second' on box: sls/participant library_sha256: expected " +
-                         std::string(64, 'c') + " (that of 'first'), got none; it is refused"));
-  // Before the first step another client may become the first.
-  EXPECT_EQ(check_.admit_controllers({second}).size(), 1u);
-  EXPECT_EQ(check_.admit_controllers({second, first}).size(), 1u);
-}
-
-TEST_F(ParticipantCheckTest, ALibraryBindsTheOthersOfItsVehicleIfItsClientCanFly) {
-  auto first = make_entry(1, "first"), second = make_entry(2, "second");
-  first.announcement.library_sha256(std::string(64, 'c'));
-  first.announcement.vehicle_ids({0});
-  const auto is_admitted = [&] { return check_.admit_controllers({first, second}).size() == 2; };
-  EXPECT_FALSE(is_admitted());
-  second.announcement.vehicle_ids({1});
-  EXPECT_TRUE(is_admitted());
-  second.announcement.vehicle_ids({0});
-  first.announcement.ready(false);
-  EXPECT_EQ(check_.admit_controllers({first, second}).at(0).peer, second.peer);
-  first.announcement.ready(true);
-  first.announcement.scenario_sha256("another");
-  EXPECT_EQ(check_.admit_controllers({first, second}).at(0).peer, second.peer);
-}
-
-TEST_F(ParticipantCheckTest, TheLibraryOfAClientThatIsGoneBindsNobody) {
-  auto dead = make_entry(1, "dead"), repaired = make_entry(2, "repaired");
-  dead.announcement.library_sha256(std::string(64, 'c'));
-  repaired.announcement.library_sha256(std::string(64, 'd'));
-  dead.is_gone = true;
-  neighbourhood_.participants = {dead, repaired};
-  const auto admitted = check_.admit_controllers(neighbourhood_.participants);
-  ASSERT_EQ(admitted.size(), 1u);
-  EXPECT_EQ(admitted[0].peer, repaired.peer);
-  EXPECT_TRUE(look().empty()) << "and nobody is refused by name";
-}
-
-TEST_F(ParticipantCheckTest, TheLibraryThatHasFlownStaysInForceWhenItsClientIsGone) {
-  auto first = make_entry(1, "first"), second = make_entry(2, "second");
-  first.announcement.library_sha256(std::string(64, 'c'));
-  second.announcement.library_sha256(std::string(64, 'd'));
-  check_.admit_controllers({first});
-  take(make_answer(0));
-  EXPECT_TRUE(check_.admit_controllers({second}).empty());
-  first.peer = make_peer(3);  // restarted
-  EXPECT_EQ(check_.admit_controllers({first, second}).size(), 1u);
-}
-
-// --- answers -------------------------------------------------------------------------------------
-
-TEST_F(ParticipantCheckTest, AnswersThatAreAllRejectedAreNamedWithCauseAndCount) {
-  neighbourhood_.participants = {make_entry(1)};
-  OfferedAnswer answer = make_answer(5);
-  answer.run_id = 0xcd;
-  for (int i = 0; i < 3; ++i) reject(answer, Verdict::kOtherRun, 5);
-  const std::string cause = "run_id: expected 00000000000000ab, got 00000000000000cd";
-  EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)),
-            " (3 of its answers rejected, none taken: " + cause + ")");
-  EXPECT_TRUE(look().empty());
-  EXPECT_EQ(look(800ms), only(kFoo + "sls/command: 3 answers rejected, none taken: " + cause));
-  take(make_answer(5));
-  EXPECT_TRUE(look(900ms).empty());
-  EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)), "");
-}
-
-TEST_F(ParticipantCheckTest, CausesOfRejection) {
-  neighbourhood_.participants = {make_entry(1)};
-  look();
-  OfferedAnswer answer = make_answer(5);
-  answer.vehicle_id = 9;
-  reject(answer, Verdict::kUnknownVehicle, 5);
-  EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)),
-            " (1 of its answers rejected, none taken: vehicle_id: expected 0-1, got 9)");
-  reject(make_answer(3), Verdict::kWrongStep, 500);
-  EXPECT_EQ(check_.answers().describe_rejections(make_peer(1)),
-            " (2 of its answers rejected, none taken: step: expected 500, got 3)");
-}
-
-TEST_F(ParticipantCheckTest, AFewAnswersToOldStepsAreNoMistake) {
-  neighbourhood_.participants = {make_entry(1)};
-  reject(make_answer(3), Verdict::kWrongStep, 500);
-  reject(make_answer(4), Verdict::kWrongStep, 500);
-  look();
-  EXPECT_TRUE(look(1s).empty());
-  reject(make_answer(5), Verdict::kWrongStep, 500);
-  EXPECT_EQ(look(2s), only(kFoo + "sls/command: 3 answers rejected, none taken: step: expected "
-                                  "500, got 5"));
-}
-
-TEST_F(ParticipantCheckTest, AnswersToStepsThatAreNotPublishedAreNamedAtOnceAndForATime) {
-  neighbourhood_.participants = {make_entry(1)};
-  reject(make_answer(13), Verdict::kWrongStep, 12);
-  const auto expected =
-      only(kFoo + "sls/command step: expected at most 12, the last published, got 13");
-  EXPECT_EQ(look(), expected);
-  EXPECT_EQ(look(2s), expected);
-  EXPECT_TRUE(look(2001ms).empty() || look(2001ms)[0].find("rejected") != std::string::npos);
-}
-
-TEST_F(ParticipantCheckTest, AnAnswerThatCameBeforeItsStateNamesTheStepBefore) {
-  neighbourhood_.participants = {make_entry(1)};
-  reject(make_answer(13), Verdict::kEarly, 13);
-  EXPECT_EQ(look(), only(kFoo + "sls/command step: expected at most 12, the last published, got "
-                                "13"));
-}
-
-TEST_F(ParticipantCheckTest, AnAnswerBeforeAnyStateIsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  reject(make_answer(0), Verdict::kEarly, 0);
-  EXPECT_EQ(look(),
-            only(kFoo + "sls/command step: expected none before a state is published, got 0"));
-}
-
-TEST_F(ParticipantCheckTest, TwoAnswersToOneStepAreNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  take(make_answer(12));
-  reject(make_answer(12), Verdict::kContradiction, 12);
-  EXPECT_EQ(look(), only(kFoo + "sls/command step 12: expected one answer, got two that differ"));
-}
-
-TEST_F(ParticipantCheckTest, AnAnswerForNoVehicleIsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  check_.answers().note_empty(make_peer(1), 3);
-  EXPECT_EQ(look(), only(kFoo + "sls/command vehicles at step 3: expected at least one answer, got "
-                                "none"));
-  EXPECT_TRUE(look(3s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AnswersOfAClientUnderAnotherNameAreNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  take(make_answer(0));
-  EXPECT_TRUE(look().empty());
-  OfferedAnswer answer = make_answer(1);
-  answer.client_name = "bar";
-  take(answer);
-  const auto expected =
-      only(kFoo + "sls/command client_name: expected 'foo', as announced, got 'bar'");
-  EXPECT_EQ(look(), expected);
-  EXPECT_EQ(look(9s), expected);  // also while the flight is paused
-  neighbourhood_.participants = {};
-  EXPECT_TRUE(look(10s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AClientThatIsDoneAndStillAnswersIsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  neighbourhood_.participants[0].announcement.done(true);
-  take(make_answer(0));
-  EXPECT_TRUE(look().empty());  // it may have been sent before
-  EXPECT_TRUE(look(500ms).empty());
-  for (std::uint64_t step = 1; step < 10; ++step) {
-    take(make_answer(step));
-    const auto found = look(500ms + step * 200ms);
-    if (step < 6)
-      EXPECT_TRUE(found.empty()) << step;
-    else
-      EXPECT_EQ(found, only(kFoo + "sls/participant done: expected false, as it still answers, got "
-                                   "true"));
-  }
-  EXPECT_TRUE(look(5s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AFloodOfCopiesIsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  const auto answer_steps = [&](int copies) {
-    for (std::uint64_t step = 0; step < 10; ++step) {
-      take(make_answer(step));
-      for (int i = 0; i < copies; ++i) take(make_answer(step), {}, Verdict::kDuplicate);
+TEST_F(ParticipantSeriesTest, AFloodOfCopiesIsNamed) {
+  play("members 1");
+  const auto answer_steps = [&](int copies, int time_ms, const std::string& expected) {
+    for (int step = 0; step < 10; ++step) {
+      play("take " + std::to_string(step));
+      for (int i = 0; i < copies; ++i) play("copy " + std::to_string(step));
     }
+    play("look " + std::to_string(time_ms) + " " + expected);
   };
-  for (int i = 0; i < 20; ++i) {  // of states that were sent again
-    answer_steps(20);
-    EXPECT_TRUE(look(i * 100ms).empty());
-  }
-  for (int i = 0; i <= 10; ++i) {
-    answer_steps(99);
-    EXPECT_EQ(
-        look(2s + i * 100ms),
-        i < 10 ? std::vector<std::string>()
-               : only(kFoo + "sls/command: expected one answer to each state, got over 30 copies "
-                             "of each"));
-  }
+  for (int i = 0; i < 20; ++i) answer_steps(20, i * 100, "none");  // of states that were sent again
+  for (int i = 0; i <= 40; ++i)
+    answer_steps(99, 2000 + i * 100,
+                 i < 40 ? "none"
+                        : kFoo +
+                              "sls/command: expected one answer to each state, got over 30 "
+                              "copies of each");
 }
 
-TEST_F(ParticipantCheckTest, AStampInTheFutureIsNamedForATime) {
-  neighbourhood_.participants = {make_entry(1), make_entry(2, "bar")};
-  neighbourhood_.participants[1].announcement.run_id(0xcd);
-  neighbourhood_.other_runs = {0xcd};
-  neighbourhood_.stamps_ahead_s = {{make_peer(1), 5.04}, {make_peer(2), 5.04}};
-  const auto expected = only(kFoo +
-                             "sls/command source timestamp: expected none in the future, got "
-                             "5.0 s ahead of our clock");
-  EXPECT_EQ(look(), expected);
-  neighbourhood_.stamps_ahead_s.clear();
-  EXPECT_EQ(look(2s), expected);
-  EXPECT_TRUE(look(2001ms).empty());
-}
-
-TEST_F(ParticipantCheckTest, AMistakeInAnswersOfAnUnannouncedWriterNamesItAsDiscoveryDoes) {
-  neighbourhood_.command_writers[make_peer(1)] = "'foo' (10.0.0.2)";
-  neighbourhood_.stamps_ahead_s = {{make_peer(1), 5.04}};
-  EXPECT_EQ(look(), only("'foo' (10.0.0.2): sls/command source timestamp: expected none in the "
-                         "future, got 5.0 s ahead of our clock"));
-}
-
-TEST_F(ParticipantCheckTest, AStageNameThatIsNotUtf8IsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  OfferedAnswer answer = make_answer(4);
-  answer.answer.stage_name = "h\xf6he";
-  for (int i = 0; i < 3; ++i, ++answer.step) {
-    take(answer);
-    EXPECT_EQ(look(i * 2s), only(kFoo + "sls/command reference.stage_name at step 4: expected "
-                                        "UTF-8, got 'h\\xf6he'"));
-  }
-  answer.answer.stage_name = "h\xc3\xb6he";
-  take(answer);
-  EXPECT_TRUE(look(7s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AStageThatIsNotReturnedIsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  model::ControllerMemory returned;
-  returned.stage = 1;
-  take(make_answer(300, 0), returned, Verdict::kHeld);
-  EXPECT_EQ(look(), only(kFoo + "sls/command controller.stage_index at step 300: expected at least "
-                                "1, as in the state, got 0"));
-}
-
-TEST_F(ParticipantCheckTest, AStageThatIsNotReturnedExplainsThatTheMissionStaysInIt) {
-  neighbourhood_.participants = {make_entry(1)};
-  model::ControllerMemory returned;
-  returned.stage = 1;
-  for (std::uint64_t step = 0; step <= 301; ++step) take(make_answer(step), returned);
-  EXPECT_EQ(look(), only(kFoo + "sls/command controller.stage_index at step 0: expected at least "
-                                "1, as in the state, got 0"));
-}
-
-TEST_F(ParticipantCheckTest, NumbersThatAreNotReturnedAreNamedAsLongAsTheyAreMissing) {
-  neighbourhood_.participants = {make_entry(1)};
-  OfferedAnswer answer = make_answer(0);
-  answer.answer.memory.numbers = Eigen::Vector2d(1.0, 2.0);
-  take(answer);
-  EXPECT_TRUE(look().empty());
-  for (int i = 1; i < 10; ++i) {
-    take(make_answer(static_cast<std::uint64_t>(i)));
-    EXPECT_EQ(look(i * 1s), only(kFoo + "sls/command controller.numbers at step 1: expected 2 of "
-                                        "them, as before, got 0"));
-  }
-}
-
-TEST_F(ParticipantCheckTest, AMissionThatStaysInAStageThatIsOverIsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  for (std::uint64_t step = 0; step <= 300; ++step) take(make_answer(step));
-  EXPECT_TRUE(look().empty());  // the tolerance of a second
-  take(make_answer(301));
-  EXPECT_EQ(look(), only(kFoo + "sls/command controller.stage_index at step 301: expected more "
-                                "than 0 (stage 'climb' was over at 2 s), got 0 and mission "
-                                "running"));
-  take(make_answer(302, 1));
-  EXPECT_TRUE(look(3s).empty());
-}
-
-TEST_F(ParticipantCheckTest, AMissionThatAdvancesIsFine) {
-  neighbourhood_.participants = {make_entry(1)};
-  for (std::uint64_t step = 0; step < 500; ++step) take(make_answer(step, step < 200 ? 0 : 1));
-  OfferedAnswer last = make_answer(500, 2);
-  last.answer.mission = model::MissionPhase::kFinished;
-  for (int i = 0; i < 500; ++i, ++last.step) take(last);  // other vehicles of the fleet still fly
-  EXPECT_TRUE(look().empty());
-}
-
-TEST_F(ParticipantCheckTest, AMissionThatNeverFinishesIsNamed) {
-  neighbourhood_.participants = {make_entry(1)};
-  for (std::uint64_t step = 0; step <= 601; ++step)
-    take(make_answer(step, step < 200 ? 0 : step < 500 ? 1 : 2));
-  EXPECT_EQ(look(), only(kFoo + "sls/command mission at step 601: expected finished after the last "
-                                "stage, which was over at 5 s, got running"));
-}
-
-TEST_F(ParticipantCheckTest, AVehicleFarFromItsReferenceIsAnnouncedOnce) {
-  state_.p_WL = {50.0, 0.0, 0.0};
-  take(make_answer(8));
-  EXPECT_TRUE(check_.answers().take_events().empty());
-  state_.p_WL = {0.0, 51.0, 0.0};
-  take(make_answer(9));
-  take(make_answer(10));
-  EXPECT_EQ(check_.answers().take_events(),
-            only("step 9: vehicle 0: load 51 m from its reference, expected at most 50 rod lengths "
-                 "(50 m)"));
-  EXPECT_TRUE(check_.answers().take_events().empty());
-  OfferedAnswer other = make_answer(11);
-  other.vehicle_id = 1;
-  state_.p_WL.setZero();
-  state_.p_WQ = {0.0, 0.0, -60.0};
-  take(other);
-  EXPECT_EQ(check_.answers().take_events(),
-            only("step 11: vehicle 1: quadrotor 60 m from its reference, expected at most 50 rod "
-                 "lengths (50 m)"));
-}
-
-TEST_F(ParticipantCheckTest, UnknownParticipantsCannotFillTheMemory) {
+TEST_F(ParticipantSeriesTest, UnknownParticipantsCannotFillTheMemory) {
   for (int i = 0; i < 100'000; ++i) {
     bus::PeerId peer;
     peer.bytes[0] = static_cast<std::uint8_t>(i);
     peer.bytes[1] = static_cast<std::uint8_t>(i >> 8);
-    check_.answers().note_rejected(make_answer(999), peer, Verdict::kWrongStep, 1);
+    check_.answers().note_rejected(parse_answer("999"), peer, Verdict::kWrongStep, 1);
   }
-  EXPECT_TRUE(look().empty());  // none of them is a participant
+  play("look 0 none");  // none of them is a participant
+}
+
+TEST(AdmissionTest, RecordersWithAnotherContractAreNotAdmitted) {
+  EXPECT_TRUE(ParticipantCheck::admit_recorders({parse_member("1 role=1 contract=")}).empty());
 }
 
 }  // namespace

@@ -60,7 +60,7 @@ TEST(ServerLockstepTest, WithoutAnAnswerTheStateIsSentAgainInDoublingIntervals) 
   EXPECT_EQ(rig.status().counters().resent(), 5u);
 }
 
-TEST(ServerLockstepTest, AfterARoundTripFourOfThemAreWaited) {
+TEST(ServerLockstepTest, ResendTimeoutIsFourRoundTrips) {
   ServerRig rig;
   rig.join("pilot");
   rig.wait_until(2);
@@ -296,7 +296,7 @@ TEST(ServerLockstepTest, PolicyHoldFliesTheLastForceAPeriodOfWallTimeEachThenThe
                    "force"}));
   rig.answer("pilot", 4);
   rig.wait_until(2000);
-  EXPECT_EQ(rig.step(), 5u) << "the deadline counts anew";
+  EXPECT_EQ(rig.step(), 5u) << "the deadline counts again";
   EXPECT_EQ(rig.status().timing().to_string(), "degraded: 2 steps held, 1 fail-safe");
 }
 
@@ -516,24 +516,12 @@ TEST(ServerLockstepTest, AMistakeThatMustLastIsReportedWhenItHas) {
   rig.answer("pilot", 0);
   rig.wait_until(450);
   rig.neighbourhood.command_writers[sync::peer(9)] = "'foo' (10.0.0.2)";
-  rig.wait_until(1799);  // the status at 800 came with the first look that saw it
+  rig.wait_until(4799);  // the status at 800 came with the first look that saw it
   EXPECT_EQ(rig.status().problem().to_string(), "");
-  rig.wait_until(1800);
+  rig.wait_until(4800);
   EXPECT_EQ(rig.status().problem().to_string(),
             "'foo' (10.0.0.2): writes sls/command: expected an announcement in sls/participant, "
             "got none");
-}
-
-TEST(ServerLockstepTest, ALoadFarFromItsReferenceIsAnEvent) {
-  ServerRig rig;
-  rig.join("pilot");
-  rig.take_log();
-  ServerRig::Answer far{0};
-  far.reference_x = 1e6;
-  rig.answer("pilot", far);
-  rig.wait_until(400);
-  EXPECT_EQ(rig.take_log(), Lines{"400: step 0: vehicle 0: load 1e+06 m from its reference, "
-                                  "expected at most 50 rod lengths (50 m)"});
 }
 
 TEST(ServerLockstepTest, ARemarkOfAPlantAtItsStartIsAnEventAtOnceOrAtTheEnd) {

@@ -114,7 +114,6 @@ class ServerRig : public Outputs, public Surroundings {
     model::ErrorCode error_code = model::ErrorCode::kNone;
     std::int64_t clock_ahead_ms = 0;
     std::int64_t queued_ms = 0;  ///< in the shell, until now
-    double reference_x = 0.0;    ///< m
   };
   void answer(const std::string& name, const Answer& answer) {
     CommandSample sample;
@@ -132,7 +131,6 @@ class ServerRig : public Outputs, public Surroundings {
       offered.client_name = name;
       offered.vehicle_id = id;
       offered.answer.f_Q_W.z() = force_z_ - answer.more_force;
-      offered.answer.reference.position.x() = answer.reference_x;
       offered.answer.mission =
           answer.is_last ? model::MissionPhase::kFinished : model::MissionPhase::kRunning;
       offered.answer.error_code = answer.error_code;
@@ -293,7 +291,7 @@ class ServerRig : public Outputs, public Surroundings {
   bool stays_on_this_machine() const override { return is_on_this_machine; }
   bool has_heard_every_claim() const override { return knows_every_claim; }
   std::uint64_t problems_version() const override { return problem.size(); }
-  Neighbourhood look(bool) override { return neighbourhood; }
+  Neighbourhood find_neighbours() override { return neighbourhood; }
   std::string replace_problems(const std::map<std::string, std::string>& found) override {
     return found.empty() ? problem : found.begin()->second;
   }

@@ -1,4 +1,4 @@
-/// Names and calls of Fast DDS 2 (2.9 to 2.14) that are others in Fast DDS 3. version3/ has the
+/// Names and calls of Fast DDS 2 (2.9 to 2.14) that differ in Fast DDS 3. version3/ has the
 /// same for that one; CMake chooses the folder. Other files use these names and do not know the
 /// version.
 #pragma once

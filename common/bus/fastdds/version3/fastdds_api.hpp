@@ -1,4 +1,4 @@
-/// Names and calls of Fast DDS 3 that are others in Fast DDS 2. version2/ has the same for that
+/// Names and calls of Fast DDS 3 that differ in Fast DDS 2. version2/ has the same for that
 /// one; CMake chooses the folder. Other files use these names and do not know the version.
 #pragma once
 

@@ -33,8 +33,8 @@ inline bool deserialize(dds::TopicDataType& type, rtps::SerializedPayload_t& pay
 template <class Generated>
 class CodedType : public Generated {
  public:
-  /// Every type of ours has a largest size. The generator takes a sequence of structs with strings
-  /// for unbounded.
+  /// Every type of ours has a largest size. The generator treats a sequence of structs with strings
+  /// as unbounded.
   bool is_bounded() const final { return true; }
   bool serialize(const void* const data, rtps::SerializedPayload_t& payload,
                  dds::DataRepresentationId_t representation) final {

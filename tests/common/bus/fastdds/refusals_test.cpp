@@ -102,47 +102,49 @@ TEST_F(RefusalsTest, AParticipantWithoutANameIsDescribedAsSuch) {
             "secured, this is not (--qos config/qos/secure.xml)\n");
 }
 
-TEST_F(RefusalsTest, OnlyKeysThatProtectDiscoverySeparateVersions) {
+TEST_F(RefusalsTest, ASecuredFlightNeedsOneVersion) {
   const bool is_old = !has_secure_announcements(kMiddlewareVersion);
   std::uint8_t number = 4;
-  for (const bool is_protected : {false, true})
+  for (const bool is_secured : {false, true})
     for (const char* version : {"2.9.1", "3.1.2"}) {
       said_.str("");
-      ParticipantListener listener({true, false, is_protected});
+      ParticipantListener listener({is_secured});
       ParticipantNews news;
       news.guid.guidPrefix.value[0] = ++number;
-      news.identity.emplace();
+      if (is_secured) news.identity.emplace();
       news.properties[kVersionProperty] = version;
       listener.on_participant(nullptr, news);
-      const bool is_apart = is_protected && is_old != (version[0] == '2');
-      EXPECT_EQ(
-          said_.str().find("expected keys of ./sls keys DIR --mixed-versions") != std::string::npos,
-          is_apart)
+      const bool is_apart = is_secured && is_old != (version[0] == '2');
+      EXPECT_EQ(said_.str().find(
+                    "its Fast DDS is " + std::string(version) + ", this one " + kMiddlewareVersion +
+                    ": expected one version in a secured flight\n") != std::string::npos,
+                is_apart)
           << said_.str();
     }
 }
 
-TEST_F(RefusalsTest, OnlyKeysThatProtectDiscoveryKeepAnotherVendorsParticipantAway) {
-  for (const bool is_protected : {false, true}) {
-    ParticipantListener listener({true, false, is_protected});
+TEST_F(RefusalsTest, OnlyKeysForOtherVendorsLetAnotherVendorsParticipantBeDiscovered) {
+  for (const bool is_for_fastdds_alone : {false, true}) {
+    ParticipantListener listener({true, is_for_fastdds_alone});
     PlainAnnouncement cyclone;
     cyclone.name = "cyclone";
     cyclone.is_secured = true;
     cyclone.as_secure = {1};
     listener.on_announcement(cyclone, "10.0.0.2");
-    EXPECT_EQ(said_.str().find("refused 'cyclone' (10.0.0.2, ") != std::string::npos, is_protected);
-    EXPECT_EQ(said_.str().find("expected keys of ./sls keys DIR --other-vendors --mixed-versions, "
-                               "got keys without them\n") != std::string::npos,
-              is_protected)
+    EXPECT_EQ(said_.str().find("refused 'cyclone' (10.0.0.2, ") != std::string::npos,
+              is_for_fastdds_alone);
+    EXPECT_EQ(said_.str().find("expected keys of ./sls keys DIR --other-vendors, got keys without "
+                               "it\n") != std::string::npos,
+              is_for_fastdds_alone)
         << said_.str();
   }
 }
 
 TEST_F(RefusalsTest, OnlyAnotherVendorsParticipantNeedsKeysThatProtectSubmessages) {
-  for (const bool has_plain_submessages : {false, true}) {
+  for (const bool is_for_fastdds_alone : {false, true}) {
     Problems problems;
     Neighbours neighbours(problems);
-    ParticipantListener listener({true, has_plain_submessages}, &neighbours);
+    ParticipantListener listener({true, is_for_fastdds_alone}, &neighbours);
     discover(listener, 2, false, kFastDds);
     discover(listener, 3, false, kCyclone);
     for (const std::uint8_t number : {2, 3}) {
@@ -153,7 +155,7 @@ TEST_F(RefusalsTest, OnlyAnotherVendorsParticipantNeedsKeysThatProtectSubmessage
       neighbours.note_endpoint(peer, {}, facts);
     }
     EXPECT_EQ(problems.describe(),
-              has_plain_submessages
+              is_for_fastdds_alone
                   ? "a participant without a name: another vendor's DDS: expected keys of ./sls "
                     "keys DIR --other-vendors, got keys without it"
                   : "");
