@@ -31,7 +31,8 @@ TEST_P(ClosedLoopProgramTest, RecordsTheFilesAndTheCertificateOfTheThreePrograms
   EXPECT_EQ(apart.at("certificate"), together.at("certificate"));
   for (const char* key : {"outcome", "timing", "last_step", "scenario_sha256", "period_s", "mode"})
     EXPECT_EQ(apart.at(key), together.at(key)) << key;
-  for (const char* name : {"state.csv", "reference.csv", "flight.csv", "scenario.yaml"})
+  for (const char* name :
+       {"state.csv", "measured.csv", "reference.csv", "flight.csv", "scenario.yaml"})
     EXPECT_EQ(read_file(folder / name), read_file(flight.recording() / name)) << name;
   const Table ours(folder / "command.csv"), theirs(flight.recording() / "command.csv");
   EXPECT_EQ(ours.names(), theirs.names());
@@ -40,10 +41,10 @@ TEST_P(ClosedLoopProgramTest, RecordsTheFilesAndTheCertificateOfTheThreePrograms
   EXPECT_EQ(verify.wait(), 0) << verify.output();
 }
 
-// A fleet with stages that end within a radius; faults; another law.
+// A fleet with stages that end within a radius; faults; another law; a multirotor with sensors.
 INSTANTIATE_TEST_SUITE_P(Scenarios, ClosedLoopProgramTest,
-                         ::testing::Values("mixed_fleet", "faulty_figure_eight",
-                                           "figure_eight_pid"),
+                         ::testing::Values("mixed_fleet", "faulty_figure_eight", "figure_eight_pid",
+                                           "px4_published"),
                          [](const auto& flown) { return std::string(flown.param); });
 
 // 11 ms and 182 of them have no exact double: times are printed with the digits that they have.

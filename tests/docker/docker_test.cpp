@@ -25,19 +25,7 @@ const std::string kCompose =
     "; if docker compose version >/dev/null 2>&1; then set -- docker compose; else set -- "
     "docker-compose; fi; \"$@\" --project-name ";
 
-struct Outcome {
-  std::optional<int> code;
-  std::string output;
-};
-
-Outcome run_command(const std::vector<std::string>& command,
-                    std::chrono::milliseconds limit = kFlightTime) {
-  Process process(command);
-  const auto code = process.wait(limit);
-  return {code, process.output()};
-}
-
-Outcome run_shell(const std::string& command) { return run_command({"sh", "-c", command}); }
+Outcome run_shell(const std::string& command) { return run({"sh", "-c", command}, kFlightTime); }
 
 /// The reason why this machine cannot fly in containers; empty if it can.
 std::optional<std::string> find_obstacle() {
@@ -60,15 +48,14 @@ void expect_owner(const fs::path& recording, uid_t owner) {
 }
 
 void expect_same_data(const fs::path& recording, const fs::path& expected) {
-  const Outcome verdict = run_command({program("sls_verify"), recording, expected});
-  EXPECT_EQ(verdict.code, 0) << verdict.output;
+  expect_exit({program("sls_verify"), recording, expected});
 }
 
 class DockerTest : public ::testing::Test {
  protected:
   void SetUp() override {
     if (const auto obstacle = find_obstacle()) GTEST_SKIP() << "skipped: " << *obstacle;
-    const Outcome image = run_command({kLauncher, "docker-demo", "--build"}, kImageTime);
+    const Outcome image = run({kLauncher, "docker-demo", "--build"}, kImageTime);
     ASSERT_EQ(image.code, 0) << image.output;
   }
 
@@ -154,34 +141,28 @@ TEST_F(DockerTest, RecordsTheSameInContainersAsOnTheMachine) {
     expect_same_data(recording(name), native.recording());
   }
   const char* image = std::getenv("SLS_IMAGE");
-  EXPECT_EQ(run_command({"docker", "run", "--rm", image ? image : "sls", "id", "-un"}).output,
-            "sls\n");
+  EXPECT_EQ(expect_exit({"docker", "run", "--rm", image ? image : "sls", "id", "-un"}), "sls\n");
 }
 
 TEST_F(DockerTest, AStandbyTakesOverFromAKilledControllerAndNothingChanges) {
   Flight native(scenario("figure_eight"));
   native.expect_success();
   const std::string output = expect_demo("standby", "figure_eight");
-  EXPECT_NE(output.find("killed the first controller"), std::string::npos) << output;
+  EXPECT_TRUE(holds(output, "killed the first controller")) << output;
   expect_same_data(recording("standby"), native.recording());
-  EXPECT_NE(output.find("controller 'standby' takes over from 'primary'"), std::string::npos)
-      << output;
+  EXPECT_TRUE(holds(output, "controller 'standby' takes over from 'primary'")) << output;
 }
 
 /// Flies the vehicles `first` to `last` of a scenario outside containers and records into `out`.
 void fly_natively(const std::string& scenario_file, int first, int last, const fs::path& out) {
-  const OwnDomain domain;
-  const std::string vehicles = std::to_string(first) + "-" + std::to_string(last);
-  const auto start = [&](const std::string& name, const std::vector<std::string>& flags) {
-    return std::make_unique<Process>(make_command(name, domain.number(), flags));
-  };
+  const Programs native;
+  const Words flags = {"--scenario", scenario_file, "--vehicles",
+                       std::to_string(first) + "-" + std::to_string(last)};
   const auto recorder =
-      start("recorder", {"--out", out.string(), "--vehicle", std::to_string(first)});
-  const auto server = start("sim_server", {"--scenario", scenario_file, "--vehicles", vehicles});
-  const auto client =
-      start("control_client", {"--scenario", scenario_file, "--vehicles", vehicles});
-  for (Process* process : {server.get(), client.get(), recorder.get()})
-    EXPECT_EQ(process->wait(), 0) << process->output();
+                 native.start("recorder", {"--out", out, "--vehicle", std::to_string(first)}),
+             server = native.start("sim_server", flags),
+             client = native.start("control_client", flags);
+  expect_success({server.get(), client.get(), recorder.get()});
 }
 
 TEST_F(DockerTest, TwoServersOnOneNetworkShareAFleet) {
@@ -221,7 +202,7 @@ TEST_F(DockerTest, ADemoEndsWithTheExitCodeOfTheProgramThatFailed) {
   Process demo(make_demo("plain", folder / "bad.yaml"));
   const std::string project = note_project("sls-demo-", demo.id());
   EXPECT_EQ(demo.wait(kFlightTime), 2) << demo.output();
-  EXPECT_NE(demo.output().find("sync.period_s: expected"), std::string::npos) << demo.output();
+  EXPECT_TRUE(holds(demo.output(), "sync.period_s: expected")) << demo.output();
   expect_nothing_left(project);
 }
 
@@ -233,9 +214,8 @@ TEST_F(DockerTest, TheComposeFileOfTheCiExampleFliesWhatItsCheckExpects) {
                             kCompose + project;
   const Outcome up = run_shell(lines + " up --build");
   EXPECT_EQ(up.code, 0) << up.output;
-  const Outcome verdict = run_command(
+  expect_exit(
       {kLauncher, "--no-install", "check", ci / "check.yaml", "--recording", ci / "recording"});
-  EXPECT_EQ(verdict.code, 0) << verdict.output;
   EXPECT_EQ(run_shell("cd " + ci.string() + kCompose + project + " down").code, 0);
   run_shell("docker image rm sls-test-ci");
   expect_nothing_left(project);
@@ -254,19 +234,18 @@ TEST_F(DockerTest, ACheckFliesAControllerInAContainerAndRefusesAMissingImage) {
                     ", control_client, --scenario,\n       /flight/scenario.yaml, --qos, '{qos}', "
                     "--domain, '{domain}']\n"
                     "expect:\n  - { measure: load_error_end_m, stage: 0, max: 0.01 }\n");
-    return run_command({kLauncher, "--no-install", "check", ci / "check.yaml"});
+    return run({kLauncher, "--no-install", "check", ci / "check.yaml"});
   };
   const char* image = std::getenv("SLS_IMAGE");
   const Outcome held = check(image ? image : "sls");
   EXPECT_EQ(held.code, 0) << held.output;
-  EXPECT_NE(held.output.find("2 flights: 2 held; the flights of each check have equal bytes"),
-            std::string::npos)
+  EXPECT_TRUE(holds(held.output, "2 flights: 2 held; the flights of each check have equal bytes"))
       << held.output;
   const Outcome missing = check("sls-no-such-image");
   EXPECT_EQ(missing.code, 2) << missing.output;
-  EXPECT_NE(missing.output.find("controller: ended with 125 at step 0, before the flight was over: "
-                                "Unable to find image"),
-            std::string::npos)
+  EXPECT_TRUE(holds(missing.output,
+                    "controller: ended with 125 at step 0, before the flight was over: "
+                    "Unable to find image"))
       << missing.output;
   EXPECT_EQ(run_shell("docker ps --all --quiet --filter volume=" + ci.string()).output, "");
 }

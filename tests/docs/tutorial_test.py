@@ -26,6 +26,7 @@ The programs use their own DDS domain (SLS_DOMAIN) and their own port, which rep
 """
 
 import base64
+import contextlib
 import os
 import pathlib
 import re
@@ -41,8 +42,11 @@ import time
 import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests/support"))
+sys.path[:0] = [str(ROOT / "tests/support"), str(ROOT / "python")]
 from own_domain import OwnDomain  # noqa: E402
+from sls.check.hosts import Hosts  # noqa: E402
+from sls.errors import RunError  # noqa: E402
+from sls.input_error import InputError  # noqa: E402
 
 DOCUMENT = ROOT / "docs/tutorial.md"
 PAGE_PORT = "8765"  # the port in the document
@@ -292,44 +296,15 @@ class Terminal:
 # --- hosts, containers, domain --------------------------------------------------------------------
 
 
-class Hosts:
-    """Network namespaces on one bridge. tests/network/network.cpp uses such names, too, and removes leftovers."""
-
-    NAMES = ("server", "controller", "recorder")
-
-    def __init__(self):
-        self.prefix = f"sls-test-{os.getpid()}-tutorial-"
-        self.obstacle = None if os.geteuid() == 0 else "network namespaces need root"
-        if self.obstacle:
-            return
+@contextlib.contextmanager
+def made_hosts():
+    """Context with the hosts of a flight, or the reason why there are none."""
+    with contextlib.ExitStack() as stack:
         try:
-            self._run("ip", "netns", "add", self.prefix + "switch")
-            self._on("switch", "ip link add br0 type bridge && ip link set br0 up")
-            for number, host in enumerate(self.NAMES, 1):
-                self._run("ip", "netns", "add", self.prefix + host)
-                self._on("switch", f"ip link add {host} type veth peer name eth0 netns {self.prefix}{host} && "
-                                   f"ip link set {host} master br0 up")
-                self._on(host, f"ip link set lo up && ip address add 10.77.0.{number}/24 dev eth0 && "
-                               "ip link set eth0 up")
-        except (Failure, OSError) as error:
-            self.remove()
-            self.obstacle = f"no network namespaces here: {error}"
-
-    def _run(self, *command):
-        done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode != 0:
-            raise Failure(" ".join(command) + ": " + done.stderr)
-
-    def _on(self, host, command):
-        self._run(*self.find_prefix(host), "sh", "-c", command)
-
-    def find_prefix(self, host):
-        return ["ip", "netns", "exec", self.prefix + host]
-
-    def remove(self):
-        if os.geteuid() == 0:
-            for host in (*self.NAMES, "switch"):
-                subprocess.run(["ip", "netns", "delete", self.prefix + host], capture_output=True)
+            hosts = stack.enter_context(Hosts(()))
+        except (InputError, RunError, OSError) as error:
+            hosts = str(error)
+        yield hosts
 
 
 def find_docker_obstacle():
@@ -392,7 +367,7 @@ class Reader:
 
     def find_obstacle(self, block):
         if "host" in block.marks or block.marks.get("needs") == "hosts":
-            return self.hosts.obstacle
+            return self.hosts if isinstance(self.hosts, str) else None
         return find_docker_obstacle() if block.marks.get("needs") == "docker" else None
 
     def find_terminal(self, block):
@@ -400,7 +375,7 @@ class Reader:
         name = block.marks.get("terminal", "1")
         if (name, host) not in self.terminals:
             self.terminals[name, host] = Terminal(name, self.folder, self.environment,
-                                                  self.hosts.find_prefix(host) if host else ())
+                                                  self.hosts.on(host) if host else ())
         return self.terminals[name, host]
 
     def follow(self, block):
@@ -488,10 +463,9 @@ def test_the_comparison_itself():
 def main():
     build = pathlib.Path(sys.argv[1]).resolve()
     test_the_comparison_itself()
-    hosts = Hosts()
     try:
         steps = read_document(DOCUMENT.read_text())
-        with OwnDomain() as domain, tempfile.TemporaryDirectory() as folder:
+        with OwnDomain() as domain, made_hosts() as hosts, tempfile.TemporaryDirectory() as folder:
             reader = Reader(pathlib.Path(folder), build, domain, hosts, "--verbose" in sys.argv)
             reader.read(steps)
             print(f"{reader.ran} commands in {time.monotonic() - reader.began:.0f} s")
@@ -500,8 +474,6 @@ def main():
     except Failure as failure:
         print(f"docs/tutorial.md:{failure}", file=sys.stderr)
         return 1
-    finally:
-        hosts.remove()
     return 0
 
 

@@ -11,18 +11,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The output of `command`; it is expected to end with `exit_code`.
-std::string run(const std::vector<std::string>& command, int exit_code = 0) {
-  Process process(command);
-  EXPECT_EQ(process.wait(), exit_code) << command[0] << "\n" << process.output();
-  return process.output();
-}
-
 /// An installation and copies of the examples, built against it.
 class Installation {
  public:
   Installation() {
-    run({SLS_CMAKE, "--install", SLS_BUILD_DIR, "--prefix", folder_ / "installed"});
+    expect_exit({SLS_CMAKE, "--install", SLS_BUILD_DIR, "--prefix", folder_ / "installed"});
     std::vector<std::unique_ptr<Process>> builds;
     for (const char* name : {"my_autopilot", "my_controller", "my_plant", "my_law", "my_logger"}) {
       fs::copy(std::string(SLS_SOURCE_DIR) + "/examples/" + name, example(name));
@@ -51,8 +44,7 @@ class Installation {
     const auto recorder = start("recorder", "--out", recording);
     const auto server = start("sim_server", "--scenario", scenario);
     const auto client = start("control_client", "--scenario", scenario);
-    for (Process* process : {server.get(), client.get(), recorder.get()})
-      EXPECT_EQ(process->wait(), 0) << server->output() << client->output() << recorder->output();
+    expect_success({server.get(), client.get(), recorder.get()});
     return recording;
   }
 
@@ -68,7 +60,7 @@ fs::path expect_same_flight(Installation& installation, const std::string& name)
   const std::string scenario = installation.scenario(name);
   const OwnDomain domain;
   const fs::path three = installation.fly(scenario, domain), one = three.string() + "-in-process";
-  run({installation.program("closed_loop"), "--scenario", scenario, "--out", one});
+  expect_exit({installation.program("closed_loop"), "--scenario", scenario, "--out", one});
   EXPECT_TRUE(read_manifest(three).at("complete").get<bool>());
   EXPECT_TRUE(read_manifest(one).at("complete").get<bool>());
   EXPECT_EQ(read_manifest(three).at("certificate"), read_manifest(one).at("certificate"));
@@ -83,7 +75,7 @@ void expect_refused(const Installation& installation, const std::string& name,
   const std::string file = installation.example(name) / "misspelt.yaml";
   write_bytes(file, replace_once(read_bytes(installation.scenario(name)), "{ " + parameter + ":",
                                  "{ x" + parameter + ":"));
-  EXPECT_EQ(run({installation.program("closed_loop"), "--scenario", file}, 2),
+  EXPECT_EQ(expect_exit({installation.program("closed_loop"), "--scenario", file}, 2),
             "closed_loop: error: " + file + ":" + std::to_string(line) + ": " + section +
                 ".parameters: " + installation.example(name).string() + "/build/" + name +
                 ".so: expected " + known + ", got x" + parameter + "\n");
@@ -96,7 +88,7 @@ TEST(ExamplesTest, AreInstalledBuiltAndFlownAsByAUser) {
   expect_same_flight(installation, "my_controller");
   expect_refused(installation, "my_controller", "position", "controller", 7,
                  "position, velocity, integral, rod_angle, rod_rate or filter_s");
-  run({"ctest", "--test-dir", installation.example("my_controller") / "build"});
+  expect_exit({"ctest", "--test-dir", installation.example("my_controller") / "build"});
   expect_same_flight(installation, "my_plant");
   expect_refused(installation, "my_plant", "stiffness_n_m", "plant", 6,
                  "stiffness_n_m or damping_n_s_m");
@@ -111,8 +103,8 @@ TEST(ExamplesTest, AreInstalledBuiltAndFlownAsByAUser) {
   const Eigen::Vector3d end = flown.position(flown.rows() - 1, "load");
   EXPECT_LT((end - Eigen::Vector3d(0.0, 0.0, -1.0)).norm(), 1e-3);
 
-  const std::string said =
-      run({installation.example("my_law") / "build/my_law", installation.scenario("my_law")});
+  const std::string said = expect_exit(
+      {installation.example("my_law") / "build/my_law", installation.scenario("my_law")});
   int steps = 0;
   double rms = 0.0, error_at_end = 1.0;
   ASSERT_EQ(std::sscanf(said.c_str(), "%d steps, load position error: rms %lf m, at the end %lf m",

@@ -12,8 +12,6 @@
 namespace sls::test {
 namespace {
 
-using Words = std::vector<std::string>;
-
 /// The vehicle is at rest and must stay there for ten minutes.
 constexpr const char* kScenario =
     "name: hang\n"
@@ -32,33 +30,25 @@ constexpr const char* kScenario =
     "    for_s: 600\n";
 
 /// Server and recorder, which wait for a controller.
-class ForeignTest : public testing::Test {
+class ForeignTest : public ProgramsTest {
  protected:
   void start(const Words& server_flags = {}) {
     std::ofstream(scenario_) << kScenario;
-    recorder = start_program("recorder", {"--out", folder_ / "recording"});
-    server = start_program("sim_server", Words{"--scenario", scenario_} + server_flags);
-    ASSERT_TRUE(wait_until([this] { return has(*server, "waiting for: controller ("); }))
-        << server->output();
-  }
-  std::unique_ptr<Process> start_program(const std::string& name, const Words& flags) const {
-    return std::make_unique<Process>(make_command(name, domain_.number(), flags));
+    recorder = Programs::start("recorder", {"--out", recording()});
+    server = Programs::start("sim_server", Words{"--scenario", scenario_} + server_flags);
+    ASSERT_TRUE(wait_for_text(*server, "waiting for: controller (")) << server->output();
   }
   /// Starts the client with `flags`; returns when its mistake becomes visible.
   std::unique_ptr<Process> start_foreign(const Words& flags) const {
-    Words command = {SLS_FOREIGN_CLIENTS "/foreign_client", "--domain", domain_.text()};
-    command.insert(command.end(), flags.begin(), flags.end());
-    return start_and_wait(command);
+    return start_and_wait(Words{SLS_FOREIGN_CLIENTS "/foreign_client", "--domain", domain.text()} +
+                          flags);
   }
   static std::unique_ptr<Process> start_and_wait(const Words& command) {
     auto client = std::make_unique<Process>(command);
-    EXPECT_TRUE(wait_until([&] { return has(*client, "begins\n"); })) << client->output();
+    EXPECT_TRUE(wait_for_text(*client, "begins\n")) << client->output();
     return client;
   }
 
-  static bool has(const Process& process, const std::string& text) {
-    return process.output().find(text) != std::string::npos;
-  }
   std::string outputs() const { return server->output() + recorder->output(); }
 
   /// Expects that `program` prints one of `lines` completely and once.
@@ -82,9 +72,8 @@ class ForeignTest : public testing::Test {
     EXPECT_NE(std::find(lines.begin(), lines.end(), problem), lines.end()) << problem;
   }
   std::string ask_problem() const {
-    Process ctl(make_command("sim_ctl", domain_.number(), {"status", "--json"}));
-    EXPECT_EQ(ctl.wait(), 0) << ctl.output();
-    const std::string text = ctl.output();
+    const std::string text =
+        expect_exit(make_command("sim_ctl", domain.number(), {"status", "--json"}));
     const auto json = nlohmann::json::parse(text.substr(text.find('{')), nullptr, false);
     return json.is_object() && json.contains("problem") ? json.at("problem").get<std::string>()
                                                         : text;
@@ -102,9 +91,7 @@ class ForeignTest : public testing::Test {
     return text.substr(text.find("run ") + 4, 16);
   }
 
-  const TemporaryFolder folder_;
-  const OwnDomain domain_;
-  const std::string scenario_ = folder_ / "hang.yaml";
+  const std::string scenario_ = folder / "hang.yaml";
   std::unique_ptr<Process> recorder, server;
 };
 
@@ -134,8 +121,8 @@ TEST_P(ForeignMistakesTest, AreNamed) {
   for (const Mistake& mistake : GetParam().all) {
     const std::string who = std::string("'") + mistake.name + "' (127.0.0.1)",
                       line = ": warning: " + replace_once(mistake.line, "CLIENT", who);
-    EXPECT_TRUE(wait_until([&] { return has(*server, line); })) << line << "\n" << outputs();
-    EXPECT_TRUE(wait_until([&] { return has(*recorder, line) == mistake.is_recorders; }))
+    EXPECT_TRUE(wait_for_text(*server, line)) << line << "\n" << outputs();
+    EXPECT_TRUE(wait_until([&] { return holds(recorder->output(), line) == mistake.is_recorders; }))
         << line << "\n"
         << outputs();
   }
@@ -190,8 +177,8 @@ TEST_F(ForeignTest, NoReaderOfStates) {
 /// It says that the run has failed. Server and client name it and fly on.
 TEST_F(ForeignTest, StatusAndStatesOfAnotherServersRun) {
   start();
-  const auto client = start_program("control_client", {"--scenario", scenario_});
-  ASSERT_TRUE(wait_until([&] { return has(*client, "joins run"); })) << client->output();
+  const auto client = Programs::start("control_client", {"--scenario", scenario_});
+  ASSERT_TRUE(wait_for_text(*client, "joins run")) << client->output();
   const auto impostor = start_foreign({"--mistake", "impostor"});
   const auto line = [this](const char* topic, const char* owner) {
     return std::string("'foreign' (127.0.0.1): ") + topic +
@@ -219,7 +206,7 @@ TEST_F(ForeignTest, AppendableTypesOfCyclone) {
       {"env",
        "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" "
        "multicast=\"true\"/></Interfaces></General></Domain></CycloneDDS>",
-       SLS_FOREIGN_CLIENTS "/appendable_client", domain_.text()});
+       SLS_FOREIGN_CLIENTS "/appendable_client", domain.text()});
   const std::string written =
       " of 'appendable' (127.0.0.1): DATA_REPRESENTATION: offered XCDR2, "
       "asked XCDR1 (compile the types as @final)";

@@ -16,14 +16,14 @@ namespace {
 using namespace std::chrono_literals;
 
 /// Independent attacks run at the same time.
-class HostileTest : public testing::Test {
+class HostileTest : public HostsTest {
  protected:
-  explicit HostileTest(const std::string& profile = "lan") : profile_name_(profile) {}
+  explicit HostileTest(const std::string& profile = "lan")
+      : HostsTest({"server", "controller", "recorder", "attacker"}), profile_name_(profile) {}
 
   void SetUp() override {
-    if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
-    network_ = std::make_unique<Network>(
-        std::vector<std::string>{"server", "controller", "recorder", "attacker"});
+    HostsTest::SetUp();
+    if (IsSkipped()) return;
     profile_ = std::make_unique<Profile>(*network_, profile_name_);
     options_ = profile_->flight_options();
   }
@@ -42,12 +42,12 @@ class HostileTest : public testing::Test {
   }
 
   Process& attack(const std::string& what, const Flight& flight,
-                  const std::string& host = "attacker", std::vector<std::string> more = {}) {
-    std::vector<std::string> command = network_->on(host);
-    command.insert(command.end(), {SLS_ATTACKER, what, "--to", network_->address("server"),
-                                   "--domain", flight.domain.text()});
-    command.insert(command.end(), more.begin(), more.end());
-    attackers_.push_back(std::make_unique<Process>(command));
+                  const std::string& host = "attacker", const Words& more = {}) {
+    attackers_.push_back(
+        std::make_unique<Process>(network_->on(host) +
+                                  Words{SLS_ATTACKER, what, "--to", network_->address("server"),
+                                        "--domain", flight.domain.text()} +
+                                  more));
     return *attackers_.back();
   }
 
@@ -65,8 +65,7 @@ class HostileTest : public testing::Test {
     ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();
     flight.client->send(SIGSTOP);
     for (auto& attacker : attackers_)
-      EXPECT_TRUE(
-          wait_until([&] { return attacker->output().find("fires") != std::string::npos; }, 20s))
+      EXPECT_TRUE(wait_until([&] { return holds(attacker->output(), "fires"); }, 20s))
           << attacker->output() << flight.outputs();
     flight.client->send(SIGCONT);
   }
@@ -131,7 +130,6 @@ class HostileTest : public testing::Test {
     expect_orderly_end(flight);
   }
 
-  std::unique_ptr<Network> network_;
   FlightOptions options_;
   std::vector<std::unique_ptr<Process>> attackers_;
   const Process* deaf_ = nullptr;  ///< the attacker that must receive nothing

@@ -13,9 +13,6 @@
 namespace sls::test {
 namespace {
 
-using Words = std::vector<std::string>;
-using std::chrono::seconds;
-
 const Words kUdp = {"--qos", qos("udp")};
 
 /// Cyclone on loopback only, like the profile `udp`. By default it would use another interface.
@@ -23,11 +20,6 @@ const Words kOnLoopback = {
     "env",
     "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" "
     "multicast=\"true\"/></Interfaces></General></Domain></CycloneDDS>"};
-
-Words lossy(int percent) {
-  return {"env", std::string("LD_PRELOAD=") + SLS_DROP_SHIM,
-          "SLS_DROP_PERCENT=" + std::to_string(percent), "SLS_DROP_SEED=1"};
-}
 
 /// The result of a cyclone_recorder: the last line of its output.
 nlohmann::json read_result(const Process& recorder) {
@@ -119,13 +111,6 @@ class InteropTest : public testing::Test {
     for (const auto& entry : std::filesystem::directory_iterator(recording_))
       if (entry.path().filename().string().rfind("run-", 0) == 0) return entry.path();
     return {};
-  }
-
-  static void expect_success(const std::vector<Process*>& processes) {
-    std::string outputs;
-    for (Process* process : processes) process->wait();
-    for (Process* process : processes) outputs += process->output();
-    for (Process* process : processes) EXPECT_EQ(process->wait(seconds(0)), 0) << outputs;
   }
 
   /// Expects that both flights have the same bytes.

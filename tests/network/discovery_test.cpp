@@ -6,12 +6,11 @@
 namespace sls::test {
 namespace {
 
-class NoMulticastTest : public testing::Test {
+class NoMulticastTest : public HostsTest {
  protected:
   void SetUp() override {
-    if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
-    network_ = std::make_unique<Network>(kHosts);
-    network_->block_multicast();
+    HostsTest::SetUp();
+    if (network_) network_->block_multicast();
   }
 
   void expect_same(const std::string& profile) {
@@ -19,8 +18,6 @@ class NoMulticastTest : public testing::Test {
     Flight flight(scenario("short"), configured.flight_options());
     test::expect_same(flight, scenario("short"));
   }
-
-  std::unique_ptr<Network> network_;
 };
 
 TEST_F(NoMulticastTest, InitialPeersFindEachOther) { expect_same("unicast"); }
@@ -59,19 +56,15 @@ TEST_F(NoMulticastTest, WithLanEachProgramNamesTheMissingOneAndSuggestsMulticast
 
 TEST_F(NoMulticastTest, ADiscoveryServerThatIsNotThereIsNamed) {
   const TemporaryFolder folder;
-  auto before = network_->on("controller");
   const std::string address = network_->address("directory");
-  before.insert(before.end(), {"env", "SLS_DISCOVERY_SERVER=" + address});
-  auto command =
-      make_command("control_client", 0, {"--scenario", make_impatient_scenario(folder, 4)},
-                   qos("discovery_server"));
-  command.insert(command.begin(), before.begin(), before.end());
-  Process client(command);
-  EXPECT_EQ(client.wait(), 1);
-  EXPECT_NE(client.output().find("no server for vehicle 0 within 4 s; the discovery server at " +
-                                 address + " does not answer"),
-            std::string::npos)
-      << client.output();
+  const std::string said = expect_exit(
+      network_->on("controller") + Words{"env", "SLS_DISCOVERY_SERVER=" + address} +
+          make_command("control_client", 0, {"--scenario", make_impatient_scenario(folder, 4)},
+                       qos("discovery_server")),
+      1);
+  EXPECT_TRUE(holds(said, "no server for vehicle 0 within 4 s; the discovery server at " + address +
+                              " does not answer"))
+      << said;
 }
 
 }  // namespace

@@ -5,13 +5,10 @@
 #include <set>
 #include <sstream>
 
-#include "tests/network/network.hpp"
-#include "tests/system/flight.hpp"
+#include "tests/network/hosts_flight.hpp"
 
 namespace sls::test {
 namespace {
-
-using Words = std::vector<std::string>;
 
 /// Longest time of a doctor. On an idle machine it is 10 s at most; this one may be busy.
 constexpr auto kMostTime = std::chrono::seconds(20);
@@ -61,11 +58,9 @@ void expect_findings(const Report& found, const Words& findings, const std::stri
 }
 
 /// Two hosts, `here` and `there`. Their /dev/shm is a folder of the test.
-class DoctorTest : public testing::Test {
+class DoctorTest : public HostsTest {
  protected:
-  void SetUp() override {
-    if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
-    network_ = std::make_unique<Network>(std::vector<std::string>{"here", "there"});
+  DoctorTest() : HostsTest({"here", "there"}) {
     std::filesystem::permissions(memory_.path(), std::filesystem::perms(01777));
   }
 
@@ -92,11 +87,9 @@ class DoctorTest : public testing::Test {
                                         int domain = 0) const {
     auto server = std::make_unique<Process>(
         before + make_command("sim_server", domain, {"--scenario", scenario("short")}, qos_file));
-    EXPECT_TRUE(wait_until([&] { return is_waiting(*server) || !server->is_running(); }));
+    EXPECT_TRUE(wait_until(
+        [&] { return holds(server->output(), "waiting for") || !server->is_running(); }));
     return server;
-  }
-  static bool is_waiting(const Process& server) {
-    return server.output().find("waiting for") != std::string::npos;
   }
   std::unique_ptr<Process> start_answerer(const std::string& host, const Words& before = {}) const {
     auto answerer = std::make_unique<Process>(on(host) + before + doctor("lan", {"--answer"}));
@@ -105,7 +98,6 @@ class DoctorTest : public testing::Test {
   }
 
   TemporaryFolder memory_;
-  std::unique_ptr<Network> network_;
 };
 
 // --- no finding ----------------------------------------------------------------------------------
@@ -125,7 +117,7 @@ TEST_P(HealthyDoctorTest, FindsNoFaultOnAnIdleMachineOrDuringAFlight) {
   const Report found = examine(on("there") + doctor(GetParam(), domain));
   expect_healthy(found);
   for (const char* name : {"sim_server", "control_client", "recorder"})
-    EXPECT_NE(found.line("data").find(name), std::string::npos) << found.text;
+    EXPECT_TRUE(holds(found.line("data"), name)) << found.text;
   if (GetParam() == std::string("lan"))
     expect_healthy(examine(on("here") + doctor("lan", with_peer(domain))));
 }
@@ -136,8 +128,8 @@ TEST_F(DoctorTest, BetweenTwoHealthyHostsSamplesAndDatagramsOfEverySizePass) {
   const auto answerer = start_answerer("there");
   const Report found = examine_there();
   expect_healthy(found);
-  EXPECT_NE(found.line("datagrams").find("60000 bytes pass"), std::string::npos) << found.text;
-  EXPECT_NE(found.line("data").find("a doctor at 10.77.0.2"), std::string::npos) << found.text;
+  EXPECT_TRUE(holds(found.line("datagrams"), "60000 bytes pass")) << found.text;
+  EXPECT_TRUE(holds(found.line("data"), "a doctor at 10.77.0.2")) << found.text;
 }
 
 // --- the network ---------------------------------------------------------------------------------
@@ -178,7 +170,7 @@ TEST_F(DoctorTest, NamesLostFragmentsWithAndWithoutADoctorThere) {
   const auto server = start_server(on("there"), qos("lan"));
   const std::string words = "8000 and 60000 bytes do not pass, 1400 do";
   const Report without = examine_there();
-  EXPECT_NE(without.line("datagrams").find(words), std::string::npos) << without.text;
+  EXPECT_TRUE(holds(without.line("datagrams"), words)) << without.text;
   const auto answerer = start_answerer("there");
   expect_findings(examine_there(), {"datagrams", "data"}, words);
 }

@@ -16,14 +16,12 @@ Profile::Profile(const Network& network, const std::string& name) : network_(net
   if (name == "discovery_server") {
     const std::string& address = network.address("directory");
     environment_.push_back("SLS_DISCOVERY_SERVER=" + address);
-    auto command = network.on("directory");
-    command.insert(command.end(),
-                   {std::string(SLS_SOURCE_DIR) + "/sls", "discovery-server", "--listen", address});
-    discovery_server_ = std::make_unique<Process>(command);
+    discovery_server_ = std::make_unique<Process>(
+        network.on("directory") +
+        Words{SLS_SOURCE_DIR "/sls", "discovery-server", "--listen", address});
   } else if (name == "secure") {
     const std::string keys = folder_ / "keys";
-    Process maker({std::string(SLS_SOURCE_DIR) + "/config/security/keys.sh", keys});
-    if (maker.wait() != 0) throw std::runtime_error("keys.sh: " + maker.output());
+    expect_exit({SLS_SOURCE_DIR "/config/security/keys.sh", keys});
     environment_.push_back("SLS_KEYS=" + keys);
   }
   options_.qos_file = qos(name);
@@ -39,10 +37,7 @@ Profile::~Profile() {
 }
 
 std::vector<std::string> Profile::before(const std::string& host) const {
-  std::vector<std::string> words = network_.on(host);
-  words.push_back("env");
-  words.insert(words.end(), environment_.begin(), environment_.end());
-  return words;
+  return network_.on(host) + Words{"env"} + environment_;
 }
 
 Figures read_figures(const std::filesystem::path& recording, const std::filesystem::path& local) {

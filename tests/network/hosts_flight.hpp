@@ -17,6 +17,20 @@ namespace sls::test {
 /// server.
 inline const std::vector<std::string> kHosts = {"server", "controller", "recorder", "directory"};
 
+/// A test on hosts; skipped where there can be none.
+class HostsTest : public testing::Test {
+ protected:
+  explicit HostsTest(std::vector<std::string> hosts = kHosts) : hosts_(std::move(hosts)) {}
+
+  void SetUp() override {
+    if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
+    network_ = std::make_unique<Network>(hosts_);
+  }
+
+  const std::vector<std::string> hosts_;
+  std::unique_ptr<Network> network_;
+};
+
 /// The profile `config/qos/NAME.xml` on hosts with the environment variables that it requires:
 /// addresses of the other hosts, address of the discovery server, keys.
 class Profile {

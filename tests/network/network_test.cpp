@@ -13,21 +13,14 @@ namespace {
 
 using namespace std::chrono_literals;
 
-class NetworkTest : public testing::Test {
+class NetworkTest : public HostsTest {
  protected:
-  void SetUp() override {
-    if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
-    network_ = std::make_unique<Network>(kHosts);
-  }
-
   /// Flies `file` in one process and, with `profile`, on three hosts, and compares.
   Figures expect_same(const std::string& profile, const std::string& file = scenario("short")) {
     const Profile configured(*network_, profile);
     Flight flight(file, configured.flight_options());
     return test::expect_same(flight, file);
   }
-
-  std::unique_ptr<Network> network_;
 };
 
 TEST_F(NetworkTest, ALinkThatLosesTwentyPercent) {
@@ -80,27 +73,17 @@ TEST_F(NetworkTest, APartitionOfFiveSecondsCostsAtMostSix) {
 
 TEST_F(NetworkTest, ARecorderThatComesLateHasEverything) {
   const Profile profile(*network_, "unicast");
-  const FlightOptions options = profile.flight_options();
-  const TemporaryFolder folder;
-  const std::filesystem::path recording = folder / "recording";
-  const OwnDomain domain;
-  const auto start = [&](const char* name, const std::vector<std::string>& flags) {
-    auto command = make_command(name, domain.number(), flags, options.qos_file);
-    const auto& before = options.before.at(name);
-    command.insert(command.begin(), before.begin(), before.end());
-    return std::make_unique<Process>(command);
-  };
-  const auto server = start("sim_server", {"--scenario", scenario("short")});
-  const auto client = start("control_client", {"--scenario", scenario("short")});
+  const Programs programs(profile.flight_options());
+  const auto server = programs.start("sim_server", {"--scenario", scenario("short")});
+  const auto client = programs.start("control_client", {"--scenario", scenario("short")});
   ASSERT_TRUE(wait_until([&] {
     return server->output().find("waiting for: recorder") != std::string::npos ||
            server->output().find("is not ready], recorder") != std::string::npos;
   })) << server->output();
-  const auto recorder = start("recorder", {"--out", recording.string()});
-  for (Process* process : {server.get(), client.get(), recorder.get()})
-    EXPECT_EQ(process->wait(), 0) << process->output();
-  const auto alone = fly_in_process(scenario("short"), folder / "alone");
-  EXPECT_TRUE(read_figures(recording, alone).is_identical);
+  const auto recorder = programs.start("recorder", {"--out", programs.recording()});
+  expect_success({server.get(), client.get(), recorder.get()});
+  const auto alone = fly_in_process(scenario("short"), programs.folder / "alone");
+  EXPECT_TRUE(read_figures(programs.recording(), alone).is_identical);
 }
 
 }  // namespace

@@ -12,13 +12,8 @@ namespace {
 
 using namespace std::chrono_literals;
 
-class StartTest : public testing::Test {
+class StartTest : public HostsTest {
  protected:
-  void SetUp() override {
-    if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
-    network_ = std::make_unique<Network>(kHosts);
-  }
-
   /// The lines of `text` that name a mistake.
   static std::string find_mistakes(const std::string& text) {
     std::istringstream lines(text);
@@ -28,8 +23,6 @@ class StartTest : public testing::Test {
         mistakes += line + "\n";
     return mistakes;
   }
-
-  std::unique_ptr<Network> network_;
 };
 
 /// SLS_LOSSY_STARTS=100 makes it a measurement; five at a time.

@@ -2,12 +2,10 @@
 
 import contextlib
 import json
-import os
 import signal
 import subprocess
 import sys
 import threading
-import time
 
 import client_program
 import numpy as np
@@ -17,6 +15,7 @@ from conftest import BUILD, PYTHON_PATH, ROOT
 
 sys.path.append(str(ROOT / "tests/support"))
 from own_domain import OwnDomain  # noqa: E402
+from processes import Processes, wait_until  # noqa: E402
 
 DEADLINE_S = 60
 LAWS = {name: client_program.LAWS[name] for name in ("pid", "counting")}
@@ -28,64 +27,34 @@ def domain():
         yield int(number)
 
 
-class Flight:
-    """Server, recorder and clients. Processes that still run at the end are killed."""
+class Flight(Processes):
+    """Server, recorder and clients."""
 
     def __init__(self, folder, domain, scenario):
-        self.folder, self.domain, self.scenario = folder, domain, scenario
+        super().__init__(folder)
+        self.domain, self.scenario = domain, scenario
         self.recording = folder / "recording"
-        self.processes = {}
-
-    def start(self, name, *command):
-        log = open(self.folder / f"{name}.log", "w")
-        with log:
-            self.processes[name] = subprocess.Popen(
-                [str(word) for word in command], stdout=log, stderr=log, cwd=self.folder,
-                env={**os.environ, "PYTHONPATH": PYTHON_PATH})
-        return self.processes[name]
-
-    def start_server(self):
-        self.start("server", BUILD / "bin/sim_server", "--scenario", self.scenario,
-                   "--domain", self.domain)
-
-    def start_recorder(self):
-        self.start("recorder", BUILD / "bin/recorder", "--out", self.recording,
-                   "--domain", self.domain)
+        self.start("recorder", [BUILD / "bin/recorder", f"--out={self.recording}", f"--domain={domain}"])
+        self.start("server", [BUILD / "bin/sim_server", f"--scenario={scenario}", f"--domain={domain}"])
 
     def start_client(self, name="python", strength=0, law="pid"):
-        return self.start(name, sys.executable, "-B", ROOT / "tests/python/client_program.py",
-                          self.scenario, self.domain, name, strength, law)
-
-    def log(self, name):
-        return (self.folder / f"{name}.log").read_text()
+        return self.start(name, [sys.executable, "-B", ROOT / "tests/python/client_program.py", self.scenario,
+                                 str(self.domain), name, str(strength), law], PYTHONPATH=PYTHON_PATH)
 
     def logs(self):
-        return "\n".join(f"--- {name}\n{self.log(name)}" for name in self.processes)
+        return "\n".join(f"--- {name}\n{self.output(name)}" for name in self.started)
 
     def wait(self, name):
         """Waits for the end of a process and returns its exit code."""
         try:
-            return self.processes[name].wait(DEADLINE_S)
+            return self.started[name].wait(DEADLINE_S)
         except subprocess.TimeoutExpired:
             pytest.fail(f"{name} goes on and on\n{self.logs()}")
-
-    def wait_until(self, is_true, what):
-        deadline = time.monotonic() + DEADLINE_S
-        while not is_true():
-            if time.monotonic() > deadline:
-                pytest.fail(f"no {what}\n{self.logs()}")
-            time.sleep(0.01)
 
     def wait_for_steps(self):
         """Waits until a part of the flight is recorded."""
         file = self.recording / "state.csv"
-        self.wait_until(lambda: file.exists() and file.stat().st_size > 100_000, "steps")
-
-    def end(self):
-        for process in self.processes.values():
-            if process.poll() is None:
-                process.kill()
-                process.wait()
+        wait_until(lambda: file.exists() and file.stat().st_size > 100_000, DEADLINE_S, "steps")
 
     @property
     def manifest(self):
@@ -101,11 +70,9 @@ def make_flight(folder, domain, for_s=32, controllers=1):
     scenario.write_text(text)
     flight = Flight(folder, domain, scenario)
     try:
-        flight.start_recorder()
-        flight.start_server()
         yield flight
     finally:
-        flight.end()
+        flight.end_all()
 
 
 def expect_flown(flight, law):
@@ -128,8 +95,8 @@ def test_a_python_law_flies_a_server_to_the_same_bits_as_in_process(tmp_path, do
 
 def test_the_example_flies_a_server(tmp_path, domain):
     with make_flight(tmp_path, domain) as flight:
-        flight.start("python", sys.executable, "-B", ROOT / "examples/python/pid_client.py",
-                     flight.scenario, "--domain", domain)
+        flight.start("python", [sys.executable, "-B", ROOT / "examples/python/pid_client.py", flight.scenario,
+                                f"--domain={domain}"], PYTHONPATH=PYTHON_PATH)
         for name in ("server", "recorder", "python"):
             assert flight.wait(name) == 0, flight.logs()
         assert flight.manifest["complete"]
@@ -153,19 +120,19 @@ def test_signals_end_clients_in_order_and_the_next_one_flies_on(tmp_path, domain
             flight.start_client(name, strength=strength)
         flight.wait_for_steps()
         for name, (number, code) in ends.items():
-            flight.processes[name].send_signal(number)
+            flight.started[name].send_signal(number)
             assert flight.wait(name) == code, flight.logs()
-            assert ("interrupted" in flight.log(name)) == (number == signal.SIGINT)
+            assert ("interrupted" in flight.output(name)) == (number == signal.SIGINT)
         expect_flown(flight, "pid")
 
 
 def test_a_law_that_does_not_return_can_be_interrupted(tmp_path, domain):
     with make_flight(tmp_path, domain) as flight:
         client = flight.start_client(law="sleepy")
-        flight.wait_until(lambda: "sleeps" in flight.log("python"), "law that sleeps")
+        wait_until(lambda: "sleeps" in flight.output("python"), DEADLINE_S, "law that sleeps")
         client.send_signal(signal.SIGINT)
         assert flight.wait("python") == 130, flight.logs()
-        assert "sls.Client: error: did not end after the stop signal" in flight.log("python")
+        assert "sls.Client: error: did not end after the stop signal" in flight.output("python")
 
 
 def test_stop_ends_a_run_in_another_thread(domain):
@@ -181,7 +148,7 @@ def test_a_law_that_raises_ends_the_client_with_the_reason(tmp_path, domain):
     with make_flight(tmp_path, domain) as flight:
         flight.start_client(law="broken")
         assert flight.wait("python") == 1, flight.logs()
-        assert "RunError: broken: vehicle 0, step 150: ValueError: no idea" in flight.log("python")
+        assert "RunError: broken: vehicle 0, step 150: ValueError: no idea" in flight.output("python")
 
 
 def test_without_a_server_it_says_so(domain):

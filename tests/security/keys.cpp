@@ -1,7 +1,5 @@
 #include "tests/security/keys.hpp"
 
-#include <stdexcept>
-
 namespace sls::test {
 namespace {
 
@@ -15,27 +13,18 @@ std::string replace_all(std::string text, const std::string& from, const std::st
 
 }  // namespace
 
-std::string run(const std::vector<std::string>& command) {
-  Process process(command);
-  const auto code = process.wait();
-  if (code != 0) throw std::runtime_error(command.front() + ": " + process.output());
-  return process.output();
+Words make_keys_command(const Words& arguments) {
+  return Words{SLS_SOURCE_DIR "/sls", "keys"} + arguments;
 }
 
-std::vector<std::string> make_keys_command(const std::vector<std::string>& arguments) {
-  std::vector<std::string> command = {SLS_SOURCE_DIR "/sls", "keys"};
-  command.insert(command.end(), arguments.begin(), arguments.end());
-  return command;
-}
-
-std::vector<std::string> Keys::as(const std::string& identity) const {
-  std::vector<std::string> before = {"env", "SLS_KEYS=" + path().string()};
+Words Keys::as(const std::string& identity) const {
+  Words before = {"env", "SLS_KEYS=" + path().string()};
   if (!identity.empty()) before.push_back("SLS_IDENTITY=" + identity);
   return before;
 }
 
 void Keys::add(const std::string& role, const std::string& name) const {
-  run(make_keys_command({path().string(), "--add", role, name}));
+  expect_exit(make_keys_command({path().string(), "--add", role, name}));
 }
 
 void Keys::add_expired(const std::string& role, const std::string& name) const {
@@ -46,23 +35,23 @@ void Keys::add_expired(const std::string& role, const std::string& name) const {
               "#!/bin/sh\n[ \"$1\" = +%s ] && exec /bin/date -d '36 hours ago' +%s\n"
               "exec /bin/date \"$@\"\n");
   fs::permissions(programs / "date", fs::perms::owner_all);
-  auto command = make_keys_command({path().string(), "--add", role, name, "--days", "1"});
-  command.insert(command.begin(), {"env", "PATH=" + programs.path().string() + ":/usr/bin:/bin"});
-  run(command);
+  expect_exit(Words{"env", "PATH=" + programs.path().string() + ":/usr/bin:/bin"} +
+              make_keys_command({path().string(), "--add", role, name, "--days", "1"}));
 }
 
 void Keys::add_usurper(const std::string& name) const {
   const fs::path own = path() / name, recorder = path() / "recorder";
   fs::copy(recorder, own);
   const TemporaryFolder work;
-  run({"openssl", "smime", "-verify", "-text", "-noverify", "-in",
-       (path() / "controller/permissions.p7s").string(), "-out", (work / "plain.xml").string()});
+  expect_exit({"openssl", "smime", "-verify", "-text", "-noverify", "-in",
+               (path() / "controller/permissions.p7s").string(), "-out",
+               (work / "plain.xml").string()});
   write_bytes(work / "wanted.xml",
               replace_all(read_bytes(work / "plain.xml"), "CN=controller,OU=controller",
                           "CN=recorder,OU=recorder"));
-  run({"openssl", "smime", "-sign", "-text", "-in", (work / "wanted.xml").string(), "-out",
-       (own / "permissions.p7s").string(), "-signer", (recorder / "certificate.pem").string(),
-       "-inkey", (recorder / "key.pem").string()});
+  expect_exit({"openssl", "smime", "-sign", "-text", "-in", (work / "wanted.xml").string(), "-out",
+               (own / "permissions.p7s").string(), "-signer",
+               (recorder / "certificate.pem").string(), "-inkey", (recorder / "key.pem").string()});
   // The identity authority issued its own certificate: if it trusts both authorities (2.9) or that
   // certificate (3.1), it accepts its own signature.
   write_bytes(own / "permissions_ca.pem", read_bytes(recorder / "permissions_ca.pem") +

@@ -3,30 +3,24 @@
 
 #include <filesystem>
 #include <string>
-#include <vector>
 
-#include "tests/support/temporary_folder.hpp"
 #include "tests/system/process.hpp"
 
 namespace sls::test {
 
-/// Runs a command to its end, and returns its output.
-/// @throws std::runtime_error with the output if it fails.
-std::string run(const std::vector<std::string>& command);
-
 /// `./sls keys` with these arguments, as a command.
-std::vector<std::string> make_keys_command(const std::vector<std::string>& arguments);
+Words make_keys_command(const Words& arguments);
 
 /// A folder of keys, made by `./sls keys`. The destructor removes it.
 class Keys {
  public:
-  Keys() { run(make_keys_command({path().string()})); }
+  Keys() { expect_exit(make_keys_command({path().string()})); }
 
   std::filesystem::path path() const { return folder_ / "keys"; }
 
   /// Command prefix that makes a program use `identity` of these keys, by default the identity of
   /// the program's role.
-  std::vector<std::string> as(const std::string& identity = {}) const;
+  Words as(const std::string& identity = {}) const;
 
   /// Adds an identity in a folder of that name.
   void add(const std::string& role, const std::string& name) const;

@@ -13,20 +13,16 @@ namespace {
 namespace fs = std::filesystem;
 
 /// Runs `command`, expects it to fail with `code` and one line, and returns this line.
-std::string fail(const std::vector<std::string>& command, int code) {
-  Process process(command);
-  EXPECT_EQ(process.wait(), code) << process.output();
-  const std::string output = process.output();
+std::string fail(const Words& command, int code) {
+  const std::string output = expect_exit(command, code);
   EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), 1) << output;
   return output;
 }
 
-std::string fail_keys(const std::vector<std::string>& arguments) {
-  return fail(make_keys_command(arguments), 2);
-}
+std::string fail_keys(const Words& arguments) { return fail(make_keys_command(arguments), 2); }
 
-std::vector<std::string> list(const fs::path& folder) {
-  std::vector<std::string> names;
+Words list(const fs::path& folder) {
+  Words names;
   for (const auto& entry : fs::directory_iterator(folder)) names.push_back(entry.path().filename());
   std::sort(names.begin(), names.end());
   return names;
@@ -34,59 +30,53 @@ std::vector<std::string> list(const fs::path& folder) {
 
 TEST(KeysTest, GiveEachRoleAFolderOfItsOwn) {
   const Keys keys;
-  const std::vector<std::string> expected = {"certificate.pem", "governance.p7s",
-                                             "identity_ca.pem", "key.pem",
-                                             "permissions.p7s", "permissions_ca.pem"};
-  EXPECT_EQ(list(keys.path()), (std::vector<std::string>{"ca", "controller", "operator", "recorder",
-                                                         "server", "viewer"}));
+  const Words expected = {"certificate.pem", "governance.p7s",  "identity_ca.pem",
+                          "key.pem",         "permissions.p7s", "permissions_ca.pem"};
+  EXPECT_EQ(list(keys.path()),
+            (Words{"ca", "controller", "operator", "recorder", "server", "viewer"}));
   for (const char* role : {"controller", "operator", "recorder", "server", "viewer"}) {
     EXPECT_EQ(list(keys.path() / role), expected);
     struct stat status;
     ASSERT_EQ(stat((keys.path() / role / "key.pem").c_str(), &status), 0);
     EXPECT_EQ(status.st_mode & 0777, 0600u) << role;
   }
-  EXPECT_EQ(list(keys.path().parent_path()), std::vector<std::string>{"keys"});
+  EXPECT_EQ(list(keys.path().parent_path()), Words{"keys"});
 }
 
 TEST(KeysTest, AreNotReplacedUnlessAskedTo) {
   const Keys keys;
   const std::string certificate = read_bytes(keys.path() / "server/certificate.pem");
-  EXPECT_NE(fail_keys({keys.path().string()}).find("--force replaces it"), std::string::npos);
+  EXPECT_TRUE(holds(fail_keys({keys.path().string()}), "--force replaces it"));
   EXPECT_EQ(read_bytes(keys.path() / "server/certificate.pem"), certificate);
-  run(make_keys_command({keys.path().string(), "--force"}));
+  expect_exit(make_keys_command({keys.path().string(), "--force"}));
   EXPECT_NE(read_bytes(keys.path() / "server/certificate.pem"), certificate);
-  EXPECT_EQ(list(keys.path().parent_path()), std::vector<std::string>{"keys"});
+  EXPECT_EQ(list(keys.path().parent_path()), Words{"keys"});
 }
 
 TEST(KeysTest, NeverReplaceAnotherFolder) {
   const TemporaryFolder folder;
   write_bytes(folder / "thesis.tex", "important");
-  EXPECT_NE(fail_keys({folder.path().string(), "--force"}).find("which --force leaves alone"),
-            std::string::npos);
-  EXPECT_EQ(list(folder.path()), std::vector<std::string>{"thesis.tex"});
+  EXPECT_TRUE(holds(fail_keys({folder.path().string(), "--force"}), "which --force leaves alone"));
+  EXPECT_EQ(list(folder.path()), Words{"thesis.tex"});
 }
 
 TEST(KeysTest, MistakesAreOneLine) {
   const TemporaryFolder folder;
   const std::string keys = (folder / "keys").string();
-  EXPECT_NE(fail_keys({}).find("expected a folder"), std::string::npos);
-  EXPECT_NE(fail_keys({keys, "--days", "0"}).find("expected 1 to 36500, got '0'"),
-            std::string::npos);
-  EXPECT_NE(fail_keys({keys, "--add", "pilot", "a"}).find("expected a role"), std::string::npos);
-  EXPECT_NE(fail_keys({keys, "--add", "controller", "../a"}).find("expected a name"),
-            std::string::npos);
-  EXPECT_NE(fail_keys({keys, "--add", "controller", "a"}).find("identity_ca.key"),
-            std::string::npos);
+  EXPECT_TRUE(holds(fail_keys({}), "expected a folder"));
+  EXPECT_TRUE(holds(fail_keys({keys, "--days", "0"}), "expected 1 to 36500, got '0'"));
+  EXPECT_TRUE(holds(fail_keys({keys, "--add", "pilot", "a"}), "expected a role"));
+  EXPECT_TRUE(holds(fail_keys({keys, "--add", "controller", "../a"}), "expected a name"));
+  EXPECT_TRUE(holds(fail_keys({keys, "--add", "controller", "a"}), "identity_ca.key"));
   EXPECT_TRUE(list(folder.path()).empty());
 }
 
 /// Programs with a mistake in their keys: exit code 2, and one line.
 class BadKeysTest : public testing::Test {
  protected:
-  std::string start_server(std::vector<std::string> before) {
+  std::string start_server(const Words& before) {
     return fail(
-        put_before(std::move(before),
-                   make_command("sim_server", 0, {"--scenario", scenario("short")}, qos("secure"))),
+        before + make_command("sim_server", 0, {"--scenario", scenario("short")}, qos("secure")),
         2);
   }
   fs::path file(const std::string& name) const { return keys_.path() / "server" / name; }
@@ -95,8 +85,7 @@ class BadKeysTest : public testing::Test {
 };
 
 TEST_F(BadKeysTest, NoFolderAtAll) {
-  EXPECT_NE(start_server({"env", "-u", "SLS_KEYS"}).find("${SLS_KEYS}: expected"),
-            std::string::npos);
+  EXPECT_TRUE(holds(start_server({"env", "-u", "SLS_KEYS"}), "${SLS_KEYS}: expected"));
 }
 
 TEST_F(BadKeysTest, AMissingFile) {

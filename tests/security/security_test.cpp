@@ -8,16 +8,11 @@
 namespace sls::test {
 namespace {
 
-bool wait_for_text(const Process& process, const std::string& text) {
-  return wait_until([&] { return process.output().find(text) != std::string::npos; });
-}
-
 // --- participants with keys ----------------------------------------------------------------------
 
 /// Sends a request of an operator.
 void operate(const SecuredRun& run, const std::vector<std::string>& words) {
-  const auto sim_ctl = run.start("sim_ctl", words, run.keys.as());
-  EXPECT_EQ(sim_ctl->wait(), 0) << sim_ctl->output();
+  expect_success({run.start("sim_ctl", words, run.keys.as()).get()});
 }
 
 TEST(SecureFlightTest, AStandbyTakesOverAndTheKilledClientIsLetInAgain) {
@@ -87,7 +82,7 @@ TEST(IntruderTest, EachIsNamedWithItsCauseAndDisturbsNothing) {
   ASSERT_TRUE(wait_for_text(*server, "waiting for"));
   std::vector<std::unique_ptr<Process>> intruders;
   const auto intrude = [&](const std::string& cause, const std::vector<std::string>& before,
-                           const std::string& qos_file = qos("secure")) {
+                           const std::string& qos_file = {}) {
     intruders.push_back(run.start("control_client", flags, before, qos_file));
     EXPECT_TRUE(wait_until([&] {
       return holds(server->output(), "refused 'control_client'") && holds(server->output(), cause);

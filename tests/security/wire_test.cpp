@@ -6,17 +6,13 @@
 #include <cstdint>
 #include <cstring>
 
-#include "tests/network/network.hpp"
+#include "tests/network/hosts_flight.hpp"
 #include "tests/security/keys.hpp"
 #include "tests/security/secured_run.hpp"
 #include "tests/support/waiting.hpp"
 
 namespace sls::test {
 namespace {
-
-bool wait_for_text(const Process& process, const std::string& text) {
-  return wait_until([&] { return process.output().find(text) != std::string::npos; });
-}
 
 template <class Value>
 std::string to_bytes(const Value& value) {
@@ -25,25 +21,20 @@ std::string to_bytes(const Value& value) {
   return bytes;
 }
 
-class WireTest : public testing::Test {
+class WireTest : public HostsTest {
  protected:
-  void SetUp() override {
-    if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
-    network_ = std::make_unique<Network>(
-        std::vector<std::string>{"server", "controller", "recorder", "stranger"});
-  }
+  WireTest() : HostsTest({"server", "controller", "recorder", "stranger"}) {}
 
   FlightOptions options(const std::string& profile) const {
     FlightOptions options;
     options.qos_file = qos(profile);
-    options.before = {{"sim_server", put_before(network_->on("server"), keys_.as())},
-                      {"control_client", put_before(network_->on("controller"), keys_.as())},
-                      {"recorder", put_before(network_->on("recorder"), keys_.as())}};
+    options.before = {{"sim_server", network_->on("server") + keys_.as()},
+                      {"control_client", network_->on("controller") + keys_.as()},
+                      {"recorder", network_->on("recorder") + keys_.as()}};
     return options;
   }
 
   Keys keys_;
-  std::unique_ptr<Network> network_;
 };
 
 /// Secrets of a flight that were found in captured packets: positions of the recording, and others.
@@ -72,7 +63,7 @@ TEST_F(WireTest, HoldsNoPlainTextOfASecuredFlight) {
   const auto listen = [&](const std::string& profile) {
     const TemporaryFolder folder;
     const std::string file = (folder / "packets").string();
-    Process capture(put_before(network_->on(Network::kSwitch), {SLS_CAPTURE, file}));
+    Process capture(network_->on(Network::kSwitch) + Words{SLS_CAPTURE, file});
     EXPECT_TRUE(wait_for_text(capture, "capturing")) << capture.output();
     Flight flight(scenario("short"), options(profile));
     flight.expect_success();
@@ -105,9 +96,9 @@ TEST_F(WireTest, WithoutMulticastASecuredFlightNeedsItsPeersNamed) {
 
 TEST_F(WireTest, SamplesForgedInTheControllersNameStopAnOpenFlightAndNotASecuredOne) {
   const auto start_forger = [&](const Flight& flight) {
-    return std::make_unique<Process>(
-        put_before(network_->on("stranger"), {SLS_FORGER, network_->address("controller"),
-                                              network_->address("server"), flight.domain.text()}));
+    return std::make_unique<Process>(network_->on("stranger") +
+                                     Words{SLS_FORGER, network_->address("controller"),
+                                           network_->address("server"), flight.domain.text()});
   };
   // Some 1,000 steps/s: the flight outlasts the forger, which sends for a second.
   network_->limit_rate(10000);

@@ -9,21 +9,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Answer {
-  int exit_code = -1;
-  std::string output;
-};
-
 class ControlTest : public ::testing::Test {
  protected:
-  Answer control(std::vector<std::string> words) const {
-    words.insert(words.begin(), {program("sim_ctl"), "--domain", flight_.domain.text()});
-    Process process(words);
-    const auto code = process.wait();
-    return {code.value_or(-1), process.output()};
+  std::string control(const Words& words, int code = 0) const {
+    return expect_exit(make_command("sim_ctl", flight_.domain.number(), words), code);
   }
   nlohmann::json read_status() const {
-    return nlohmann::json::parse(control({"status", "--json"}).output);
+    return nlohmann::json::parse(control({"status", "--json"}));
   }
 
   Flight flight_{scenario("figure_eight"), {{}, {"--mode", "realtime"}, {}}};
@@ -32,18 +24,15 @@ class ControlTest : public ::testing::Test {
 TEST_F(ControlTest, ResetBeginsANewRunInASubfolderAndKeepsTheFirst) {
   ASSERT_TRUE(flight_.wait_for_steps(100)) << flight_.outputs();
   const auto first = read_status();
-  const Answer refused = control({"resume"});
-  EXPECT_EQ(refused.exit_code, 1);
-  EXPECT_TRUE(holds(refused.output, "not paused")) << refused.output;
-  const Answer reset = control({"reset"});
-  EXPECT_EQ(reset.exit_code, 0) << reset.output;
+  const std::string refused = control({"resume"}, 1);
+  EXPECT_TRUE(holds(refused, "not paused")) << refused;
+  control({"reset"});
   ASSERT_TRUE(wait_until([&] {
     const auto status = read_status();
     return status.at("run_id") != first.at("run_id") && status.at("step").get<int>() > 50;
   })) << flight_.outputs();
   const auto second = read_status();
-  const Answer stop = control({"stop"});
-  EXPECT_EQ(stop.exit_code, 0) << stop.output;
+  control({"stop"});
   flight_.wait();
   EXPECT_EQ(read_manifest(flight_.recording()).at("outcome"), "reset");
   EXPECT_EQ(read_manifest(flight_.recording()).at("run_id"), first.at("run_id"));
@@ -66,8 +55,7 @@ TEST(ResetTest, ASuccessorThatCannotBeMadeEndsTheRunWithItsCause) {
   Flight flight(scenario("figure_eight"), options);
   ASSERT_TRUE(flight.wait_for_steps(50)) << flight.outputs();
   write_bytes(no_threads, "");  // the next run's state queue needs a thread
-  Process reset({program("sim_ctl"), "--domain", flight.domain.text(), "reset"});
-  EXPECT_EQ(reset.wait(), 0) << reset.output();
+  expect_success({flight.start("sim_ctl", {"reset"}).get()});
   flight.wait();
   const std::string cause = "Resource temporarily unavailable";
   for (Process* process : {flight.server.get(), flight.client.get(), flight.recorder.get()}) {

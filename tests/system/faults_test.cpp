@@ -64,11 +64,9 @@ TEST(FaultsTest, KilledServerEndsClientAndRecorderWithItsAbsenceNamed) {
   ASSERT_TRUE(flight.wait_for_steps(500)) << flight.outputs();
   flight.server->kill();
   EXPECT_EQ(flight.client->wait(), 1) << flight.outputs();
-  EXPECT_NE(flight.client->output().find("(silent for "), std::string::npos)
-      << flight.client->output();
+  EXPECT_TRUE(holds(flight.client->output(), "(silent for ")) << flight.client->output();
   EXPECT_EQ(flight.recorder->wait(), 1) << flight.outputs();
-  EXPECT_NE(flight.recorder->output().find("given up after 4 s"), std::string::npos)
-      << flight.recorder->output();
+  EXPECT_TRUE(holds(flight.recorder->output(), "given up after 4 s")) << flight.recorder->output();
   expect_parsable(flight.recording());
   EXPECT_FALSE(read_manifest(flight.recording()).at("complete").get<bool>());
 }
@@ -82,9 +80,8 @@ TEST(FaultsTest, SingularStateEndsTheRunWithItsFaultAndNoNaN) {
   EXPECT_EQ(flight.server->wait(), 1) << flight.outputs();
   EXPECT_EQ(flight.client->wait(), 1) << flight.outputs();
   EXPECT_EQ(flight.recorder->wait(), 1) << flight.outputs();
-  EXPECT_NE(flight.server->output().find(
-                "controller 'control_client' answered step 0 with a fault: rod_level"),
-            std::string::npos)
+  EXPECT_TRUE(holds(flight.server->output(),
+                    "controller 'control_client' answered step 0 with a fault: rod_level"))
       << flight.server->output();
   expect_parsable(flight.recording());
   const Table commands(flight.recording() / "command.csv");
@@ -106,17 +103,16 @@ TEST(FaultsTest, AFullDiskEndsTheRecordingWithFileAndCauseAndNoFileLooksWhole) {
     ~Unmount() { umount2(path.c_str(), MNT_DETACH); }
   } unmount{disk};
   const std::string file = make_scenario(folder, "", "", "figure_eight");
-  OwnDomain domain;
-  Process recorder(make_command("recorder", domain.number(), {"--out", disk + "/recording"}));
-  Process server(make_command("sim_server", domain.number(), {"--scenario", file}));
-  Process client(make_command("control_client", domain.number(), {"--scenario", file}));
-  EXPECT_EQ(recorder.wait(), 1) << recorder.output();
-  EXPECT_NE(recorder.output().find("No space left on device"), std::string::npos)
-      << recorder.output();
-  EXPECT_NE(recorder.output().find(".csv: cannot write"), std::string::npos) << recorder.output();
-  EXPECT_EQ(server.wait(), 1) << server.output();
-  EXPECT_NE(server.output().find("recorder"), std::string::npos) << server.output();
-  EXPECT_EQ(client.wait(), 1) << client.output();
+  const Programs programs;
+  const auto recorder = programs.start("recorder", {"--out", disk + "/recording"}),
+             server = programs.start("sim_server", {"--scenario", file}),
+             client = programs.start("control_client", {"--scenario", file});
+  EXPECT_EQ(recorder->wait(), 1) << recorder->output();
+  EXPECT_TRUE(holds(recorder->output(), "No space left on device")) << recorder->output();
+  EXPECT_TRUE(holds(recorder->output(), ".csv: cannot write")) << recorder->output();
+  EXPECT_EQ(server->wait(), 1) << server->output();
+  EXPECT_TRUE(holds(server->output(), "recorder")) << server->output();
+  EXPECT_EQ(client->wait(), 1) << client->output();
   expect_parsable(disk + "/recording");
   EXPECT_FALSE(read_manifest(disk + "/recording").at("complete").get<bool>());
 }

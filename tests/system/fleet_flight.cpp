@@ -36,20 +36,6 @@ std::vector<std::size_t> find_rows(const Table& table, std::uint32_t id) {
   return rows;
 }
 
-std::vector<std::string> read_rows(const std::filesystem::path& file, std::uint32_t id,
-                                   const std::vector<std::string>& left_out) {
-  const Table table(file);
-  std::vector<std::string> texts;
-  for (const std::size_t row : find_rows(table, id)) {
-    std::string text;
-    for (const std::string& column : table.names())
-      if (std::count(left_out.begin(), left_out.end(), column) == 0)
-        text += column + "=" + table.text(row, column) + " ";
-    texts.push_back(text);
-  }
-  return texts;
-}
-
 }  // namespace
 
 std::string make_fleet_scenario(const TemporaryFolder& folder,
@@ -65,18 +51,23 @@ void expect_each_flies_as_alone(const std::filesystem::path& recording,
                                 const std::string& scenario_file,
                                 const std::vector<std::uint32_t>& ids) {
   const config::Scenario fleet = config::load_scenario(scenario_file);
-  const Table states(recording / "state.csv"), commands(recording / "command.csv");
+  const Table states(recording / "state.csv"), commands(recording / "command.csv"),
+      references(recording / "reference.csv");
   std::size_t longest = 0;
   for (const std::uint32_t id : ids) {
     SCOPED_TRACE("vehicle " + std::to_string(id));
     const auto flown = closed_loop::fly(fleet, id);
-    const auto state_rows = find_rows(states, id), command_rows = find_rows(commands, id);
+    const auto state_rows = find_rows(states, id), command_rows = find_rows(commands, id),
+               reference_rows = find_rows(references, id);
     ASSERT_GE(state_rows.size(), flown.size());
     ASSERT_EQ(command_rows.size(), state_rows.size());
+    ASSERT_EQ(reference_rows.size(), state_rows.size());
     for (std::size_t step = 0; step < flown.size(); ++step) {
       const std::size_t s = state_rows[step], c = command_rows[step];
       ASSERT_EQ(states.number(s, "step"), static_cast<double>(step));
       ASSERT_EQ(commands.number(c, "step"), static_cast<double>(step));
+      ASSERT_EQ(references.position(reference_rows[step], "ref"),
+                flown[step].answer.reference.position);
       ASSERT_EQ(states.position(s, "quad"), flown[step].truth.p_WQ) << "step " << step;
       ASSERT_EQ(states.position(s, "load"), flown[step].truth.p_WL) << "step " << step;
       ASSERT_EQ(states.number(s, "load_vx_m_s"), flown[step].truth.v_WL.x()) << "step " << step;
@@ -87,12 +78,6 @@ void expect_each_flies_as_alone(const std::filesystem::path& recording,
     longest = std::max(longest, flown.size());
   }
   EXPECT_EQ(states.rows(), ids.size() * longest);
-}
-
-VehicleRows read_vehicle_rows(const std::filesystem::path& recording, std::uint32_t id) {
-  return {read_rows(recording / "state.csv", id, {"vehicle_id"}),
-          read_rows(recording / "command.csv", id, {"vehicle_id", "controller", "compute_us"}),
-          read_rows(recording / "reference.csv", id, {"vehicle_id"})};
 }
 
 }  // namespace sls::test

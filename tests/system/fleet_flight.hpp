@@ -23,11 +23,4 @@ void expect_each_flies_as_alone(const std::filesystem::path& recording,
                                 const std::string& scenario_file,
                                 const std::vector<std::uint32_t>& ids);
 
-/// Rows of state.csv, command.csv and reference.csv of one vehicle, as text, without vehicle_id and
-/// the columns that differ between equal flights (controller, compute_us).
-struct VehicleRows {
-  std::vector<std::string> state, command, reference;
-};
-VehicleRows read_vehicle_rows(const std::filesystem::path& recording, std::uint32_t id);
-
 }  // namespace sls::test

@@ -21,52 +21,17 @@ const std::vector<std::uint32_t> kAll = {0, 1, 2, 3, 4, 5};
 
 using Changes = std::vector<std::pair<std::string, std::string>>;
 
-/// True if `rows` begins with `beginning`.
-bool begin_with(const std::vector<std::string>& rows, const std::vector<std::string>& beginning) {
-  return rows.size() >= beginning.size() &&
-         std::equal(beginning.begin(), beginning.end(), rows.begin());
-}
+class FleetTest : public ProgramsTest {};
 
-class FleetTest : public ::testing::Test {
- protected:
-  /// Starts one of the programs in the test's own domain.
-  std::unique_ptr<Process> start(const char* name, const std::vector<std::string>& flags,
-                                 const std::string& qos_file = {}) const {
-    return std::make_unique<Process>(make_command(name, domain_.number(), flags, qos_file));
-  }
-  std::string recording() const { return folder_ / "recording"; }
-
-  const TemporaryFolder folder_;
-  const OwnDomain domain_;
-};
-
-TEST_F(FleetTest, RecordsEachOfDifferentVehiclesAsARunOfItAlone) {
-  const config::Scenario fleet = config::load_scenario(scenario("mixed_fleet"));
-  const fs::path together = fly_in_process(scenario("mixed_fleet"), folder_ / "together");
-  std::size_t shortest = SIZE_MAX, longest = 0;
-  for (std::uint32_t id = 0; id < fleet.vehicles.size(); ++id) {
-    SCOPED_TRACE("vehicle " + std::to_string(id));
-    const std::string name = "vehicle" + std::to_string(id), file = folder_ / (name + ".yaml");
-    write_bytes(file, config::to_yaml(config::make_vehicle_scenario(fleet, id)));
-    const VehicleRows own = read_vehicle_rows(fly_in_process(file, folder_ / name), 0);
-    const VehicleRows among = read_vehicle_rows(together, id);
-    EXPECT_TRUE(begin_with(among.state, own.state));
-    EXPECT_TRUE(begin_with(among.command, own.command));
-    EXPECT_TRUE(begin_with(among.reference, own.reference));
-    shortest = std::min(shortest, own.state.size());
-    longest = std::max(longest, own.state.size());
-  }
-  EXPECT_LT(shortest, longest) << "all finish at once: of the end this test sees nothing";
-  EXPECT_EQ(read_manifest(together).at("last_step"), longest - 1);
-  for (std::uint32_t id = 0; id < fleet.vehicles.size(); ++id)
-    EXPECT_EQ(read_vehicle_rows(together, id).command.size(), longest);
-
-  const Table joined(together / "flight.csv");
+TEST_F(FleetTest, OfOneProcessRecordsEachAsAlone) {
+  const std::string file = scenario("mixed_fleet");
+  const fs::path together = fly_in_process(file, folder / "together");
+  expect_each_flies_as_alone(together, file, {0, 1, 2, 3});
+  const Table joined(together / "flight.csv"), states(together / "state.csv");
   EXPECT_EQ(joined.names().back(), "vehicle_id");
-  std::map<std::string, std::size_t> rows;
-  for (std::size_t i = 0; i < joined.rows(); ++i) ++rows[joined.text(i, "vehicle_id")];
-  for (std::uint32_t id = 0; id < fleet.vehicles.size(); ++id)
-    EXPECT_EQ(rows[std::to_string(id)], longest);
+  ASSERT_EQ(joined.rows(), states.rows());
+  for (std::size_t row = 0; row < joined.rows(); ++row)
+    ASSERT_EQ(joined.text(row, "vehicle_id"), states.text(row, "vehicle_id")) << row;
 }
 
 // --- one fleet, spread in different ways ---------------------------------------------------------
@@ -91,20 +56,18 @@ class SpreadTest : public FleetTest, public ::testing::WithParamInterface<Spread
 
 TEST_P(SpreadTest, EveryVehicleFliesAsAlone) {
   const Spread& spread = GetParam();
-  const std::string file = spread.vehicles.empty() ? make_fleet_scenario(folder_)
-                                                   : make_grid_scenario(folder_, spread.vehicles);
-  const auto recorder = start("recorder", {"--out", recording()}, spread.qos_file);
-  const auto server =
-      start("sim_server", {"--scenario", file, "--threads", spread.threads}, spread.qos_file);
-  std::vector<std::unique_ptr<Process>> clients;
+  const std::string file = spread.vehicles.empty() ? make_fleet_scenario(folder)
+                                                   : make_grid_scenario(folder, spread.vehicles);
+  std::vector<std::unique_ptr<Process>> programs;
+  const auto start = [&](const char* name, const Words& flags) {
+    programs.push_back(Programs::start(name, flags, {}, spread.qos_file));
+  };
+  start("recorder", {"--out", recording()});
+  start("sim_server", {"--scenario", file, "--threads", spread.threads});
   for (const std::string& vehicles : spread.clients)
-    clients.push_back(start("control_client",
-                            {"--scenario", file, "--vehicles", vehicles, "--name",
-                             "of-" + std::to_string(clients.size())},
-                            spread.qos_file));
-  EXPECT_EQ(server->wait(), 0) << server->output();
-  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
-  for (const auto& client : clients) EXPECT_EQ(client->wait(), 0) << client->output();
+    start("control_client",
+          {"--scenario", file, "--vehicles", vehicles, "--name", "of-" + vehicles.substr(0, 1)});
+  for (const auto& process : programs) EXPECT_EQ(process->wait(), 0) << process->output();
   EXPECT_TRUE(read_manifest(recording()).at("complete").get<bool>());
   expect_each_flies_as_alone(
       recording(), file,
@@ -120,19 +83,19 @@ INSTANTIATE_TEST_SUITE_P(
     [](const auto& parameter) { return std::string(parameter.param.name); });
 
 TEST_F(FleetTest, SharedByTwoServersFliesAsAlone) {
-  const std::string file = make_fleet_scenario(folder_);
+  const std::string file = make_fleet_scenario(folder);
   const std::vector<std::vector<std::uint32_t>> halves = {{0, 1}, {2, 3, 4, 5}};
   std::vector<std::unique_ptr<Process>> programs;
   for (const std::string vehicles : {"0-1", "2-5"}) {
     const std::string first = vehicles.substr(0, 1);
-    programs.push_back(start("recorder", {"--out", recording() + first, "--vehicle", first}));
+    programs.push_back(start("recorder", {"--out", folder / first, "--vehicle", first}));
     programs.push_back(start("sim_server", {"--scenario", file, "--vehicles", vehicles}));
     programs.push_back(start(
         "control_client", {"--scenario", file, "--vehicles", vehicles, "--name", "of-" + first}));
   }
   for (const auto& process : programs) EXPECT_EQ(process->wait(), 0) << process->output();
   for (const auto& ids : halves)
-    expect_each_flies_as_alone(recording() + std::to_string(ids[0]), file, ids);
+    expect_each_flies_as_alone(folder / std::to_string(ids[0]), file, ids);
 }
 
 // --- failures ------------------------------------------------------------------------------------
@@ -142,11 +105,10 @@ const Changes kLong = {{"for_s: 0.4", "for_s: 60"}};
 
 TEST_F(FleetTest, AKilledClientOfOneHalfIsReplacedByAStandbyAndNothingElseChanges) {
   const std::string file = make_fleet_scenario(
-      folder_, {{"controllers: 1", "controllers: 2"}, {"for_s: 0.4", "for_s: 8"}});
+      folder, {{"controllers: 1", "controllers: 2"}, {"for_s: 0.4", "for_s: 8"}});
   Flight flight(file, {{}, {}, {"--vehicles", "0-2", "--name", "first-half", "--strength", "2"}});
-  const auto start_other = [&](std::vector<std::string> flags) {
-    flags.insert(flags.end(), {"--scenario", file});
-    return std::make_unique<Process>(make_command("control_client", flight.domain.number(), flags));
+  const auto start_other = [&](const Words& flags) {
+    return flight.start("control_client", Words{"--scenario", file} + flags);
   };
   const auto second =
       start_other({"--vehicles", "3-5", "--name", "second-half", "--strength", "2"});
@@ -179,15 +141,11 @@ class GroupTest : public FleetTest, public ::testing::WithParamInterface<Group> 
 TEST_P(GroupTest, AClientDiesAndNoByteChanges) {
   const std::string file = scenario(GetParam().scenario);
   const std::string qos_file = GetParam().is_lossy ? qos("udp") : "";
-  const auto run = [&](const char* name, std::vector<std::string> flags) {
-    std::vector<std::string> command = make_command(name, domain_.number(), flags, qos_file);
-    if (GetParam().is_lossy)
-      command.insert(command.begin(), {"env", std::string("LD_PRELOAD=") + SLS_DROP_SHIM,
-                                       "SLS_DROP_PERCENT=5", "SLS_DROP_SEED=1"});
-    return std::make_unique<Process>(command);
+  const auto run = [&](const char* name, const Words& flags) {
+    return start(name, flags, GetParam().is_lossy ? lossy(5) : Words{}, qos_file);
   };
   const auto recorder = run("recorder", {"--out", recording()});
-  const auto server = run("sim_server", {"--scenario", file, kManySteps[0], kManySteps[1]});
+  const auto server = run("sim_server", Words{"--scenario", file} + kManySteps);
   std::vector<std::unique_ptr<Process>> clients;
   const std::size_t count = config::load_scenario(file).vehicles.size();
   const std::string last = std::to_string(count - 1);
@@ -199,7 +157,7 @@ TEST_P(GroupTest, AClientDiesAndNoByteChanges) {
                                            "standby", "--strength", "1"}));
   // With losses the standby may be found first and begin the flight.
   const auto is_flown_by_the_last = [&] {
-    const std::string commands = recording() + "/command.csv";
+    const fs::path commands = recording() / "command.csv";
     return fs::exists(commands) && fs::file_size(commands) > 100'000 &&
            holds(read_file(commands), ",of-" + last);
   };
@@ -218,17 +176,13 @@ INSTANTIATE_TEST_SUITE_P(FleetTest, GroupTest,
                          ::testing::Values(Group{"one_controller_dies", false},
                                            Group{"aggressive_slack", false},
                                            Group{"lift_and_set_down", false},
-                                           Group{"rotors_carry_a_triangle", false},
                                            Group{"two_carry_a_bar", true}),
                          [](const auto& flown) { return std::string(flown.param.scenario); });
 
 TEST_F(FleetTest, VehiclesThatAreNotInTheScenarioAreRefused) {
-  const std::string file = make_fleet_scenario(folder_);
-  const auto expect_refused = [](const std::vector<std::string>& command,
-                                 const std::string& cause) {
-    Process process(command);
-    EXPECT_EQ(process.wait(), 2);
-    const std::string said = process.output();
+  const std::string file = make_fleet_scenario(folder);
+  const auto expect_refused = [](const Words& command, const std::string& cause) {
+    const std::string said = expect_exit(command, 2);
     EXPECT_TRUE(std::regex_search(said, std::regex("^[a-z_]+: error: "))) << said;
     EXPECT_TRUE(holds(said, cause)) << said;
     EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
@@ -267,13 +221,10 @@ Resources read_resources(pid_t id) {
 
 TEST_F(FleetTest, NeitherMemoryNorDescriptorsGrowInFlightAndNothingIsLeftBehind) {
   // A small history of sls/record: it fills quickly and then no longer grows.
-  const std::string file = make_fleet_scenario(folder_, kLong);
-  Flight flight(file, {make_qos_with_history(folder_, "default", "100"), {}, {}});
-  const auto control = [&](const std::vector<std::string>& words) {
-    std::vector<std::string> command = {program("sim_ctl"), "--domain", flight.domain.text()};
-    command.insert(command.end(), words.begin(), words.end());
-    Process process(command);
-    ASSERT_EQ(process.wait(), 0) << process.output() << flight.outputs();
+  const std::string file = make_fleet_scenario(folder, kLong);
+  Flight flight(file, {make_qos_with_history(folder, "default", "100"), {}, {}});
+  const auto control = [&](const Words& words) {
+    expect_success({flight.start("sim_ctl", words).get()});
   };
   ASSERT_TRUE(flight.wait_for_steps(6)) << flight.outputs();
   control({"pause"});
@@ -301,17 +252,16 @@ TEST_F(FleetTest, NeitherMemoryNorDescriptorsGrowInFlightAndNothingIsLeftBehind)
 
 TEST_F(FleetTest, ARecorderKeepsNothingOfAnotherRunOnItsDomain) {
   const std::string file = make_fleet_scenario(
-      folder_, {{"for_s: 0.4", "for_s: 30"}, {"timeout_s: 30", "timeout_s: 300"}});
+      folder, {{"for_s: 0.4", "for_s: 30"}, {"timeout_s: 30", "timeout_s: 300"}});
   const auto recorder = start("recorder", {"--out", recording()});
-  ASSERT_TRUE(wait_until([&] { return holds(recorder->output(), "waiting for: server"); }))
-      << recorder->output();
+  ASSERT_TRUE(wait_for_text(*recorder, "waiting for: server")) << recorder->output();
   const long before_kb = read_resources(recorder->id()).resident_kb;
-  const std::string others = folder_ / "others";
+  const fs::path others = folder / "others";
   std::vector<std::unique_ptr<Process>> programs;
   programs.push_back(start("recorder", {"--out", others, "--vehicle", "1"}));
   for (const char* name : {"sim_server", "control_client"})
     programs.push_back(start(name, {"--scenario", file, "--vehicles", "1-5"}));
-  ASSERT_TRUE(wait_until([&] { return read_file(others + "/state.csv").size() > 1'000'000; }))
+  ASSERT_TRUE(wait_until([&] { return read_file(others / "state.csv").size() > 1'000'000; }))
       << programs[0]->output();
   // The recorder's own run begins during the other one and waits for its client until the other
   // ends.
@@ -323,8 +273,7 @@ TEST_F(FleetTest, ARecorderKeepsNothingOfAnotherRunOnItsDomain) {
   // the recorder's own run take about 4 MB.
   EXPECT_LT(read_resources(recorder->id()).resident_kb, before_kb + 11'000);
   const auto client = start("control_client", {"--scenario", file, "--vehicles", "0"});
-  for (Process* process : {server.get(), client.get(), recorder.get()})
-    EXPECT_EQ(process->wait(), 0) << process->output();
+  expect_success({server.get(), client.get(), recorder.get()});
   expect_each_flies_as_alone(recording(), file, {0});
 }
 

@@ -1,7 +1,5 @@
 #include "tests/system/flight.hpp"
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <cstdlib>
 #include <fstream>
@@ -26,13 +24,23 @@ std::size_t count_lines(const std::filesystem::path& file) {
 
 }  // namespace
 
-std::vector<std::string> make_command(const std::string& name, int domain,
-                                      const std::vector<std::string>& flags,
-                                      const std::string& qos_file) {
-  std::vector<std::string> command = {program(name), "--domain", std::to_string(domain)};
-  if (!qos_file.empty()) command.insert(command.end(), {"--qos", qos_file});
-  command.insert(command.end(), flags.begin(), flags.end());
-  return command;
+Words make_command(const std::string& name, int domain, const Words& flags,
+                   const std::string& qos_file) {
+  const Words command = {program(name), "--domain", std::to_string(domain)};
+  return command + (qos_file.empty() ? Words{} : Words{"--qos", qos_file}) + flags;
+}
+
+Words lossy(int percent) {
+  return {"env", std::string("LD_PRELOAD=") + SLS_DROP_SHIM,
+          "SLS_DROP_PERCENT=" + std::to_string(percent), "SLS_DROP_SEED=1"};
+}
+
+std::unique_ptr<Process> Programs::start(const std::string& name, const Words& flags,
+                                         const Words& before, const std::string& qos_file) const {
+  const auto own = options_.before.find(name);
+  return std::make_unique<Process>(
+      (own == options_.before.end() ? Words{} : own->second) + before +
+      make_command(name, domain.number(), flags, qos_file.empty() ? options_.qos_file : qos_file));
 }
 
 std::string make_long_scenario(const TemporaryFolder& folder,
@@ -42,22 +50,11 @@ std::string make_long_scenario(const TemporaryFolder& folder,
   return make_scenario(folder, changes, "figure_eight");
 }
 
-Flight::Flight(const std::string& scenario_file, const FlightOptions& options)
-    : recording_(folder / "recording") {
-  std::vector<std::string> server_flags = {"--scenario", scenario_file};
-  std::vector<std::string> client_flags = server_flags;
-  server_flags.insert(server_flags.end(), options.server.begin(), options.server.end());
-  client_flags.insert(client_flags.end(), options.client.begin(), options.client.end());
-  const auto start = [&](const char* name, const std::vector<std::string>& flags) {
-    const auto before = options.before.find(name);
-    auto command = make_command(name, domain.number(), flags, options.qos_file);
-    if (before != options.before.end())
-      command.insert(command.begin(), before->second.begin(), before->second.end());
-    return std::make_unique<Process>(command);
-  };
-  recorder = start("recorder", {"--out", recording_.string()});
-  server = start("sim_server", server_flags);
-  client = start("control_client", client_flags);
+Flight::Flight(const std::string& scenario_file, const FlightOptions& options) : Programs(options) {
+  const Words flags = {"--scenario", scenario_file};
+  recorder = start("recorder", {"--out", recording()});
+  server = start("sim_server", flags + options.server);
+  client = start("control_client", flags + options.client);
 }
 
 void Flight::wait() {
@@ -66,16 +63,13 @@ void Flight::wait() {
 }
 
 void Flight::expect_success() {
-  wait();
-  EXPECT_EQ(server->wait(), 0) << outputs();
-  EXPECT_EQ(client->wait(), 0) << outputs();
-  EXPECT_EQ(recorder->wait(), 0) << outputs();
-  ASSERT_TRUE(std::filesystem::exists(recording_ / "manifest.json")) << outputs();
-  EXPECT_TRUE(read_manifest(recording_).at("complete").get<bool>()) << outputs();
+  test::expect_success({server.get(), client.get(), recorder.get()});
+  ASSERT_TRUE(std::filesystem::exists(recording() / "manifest.json")) << outputs();
+  EXPECT_TRUE(read_manifest(recording()).at("complete").get<bool>()) << outputs();
 }
 
 bool Flight::wait_for_steps(std::size_t steps) const {
-  return wait_until([&] { return count_lines(recording_ / "state.csv") > steps; });
+  return wait_until([&] { return count_lines(recording() / "state.csv") > steps; });
 }
 
 std::string Flight::outputs() const {
@@ -126,10 +120,8 @@ std::string read_certificate(const std::filesystem::path& recording) {
 std::filesystem::path fly_in_process(const std::string& scenario_file,
                                      const std::filesystem::path& recording,
                                      const std::vector<std::string>& flags) {
-  Process process(std::vector<std::string>{program("closed_loop"), "--scenario", scenario_file,
-                                           "--out", recording} +
-                  flags);
-  EXPECT_EQ(process.wait(), 0) << process.output();
+  expect_exit(Words{program("closed_loop"), "--scenario", scenario_file, "--out", recording} +
+              flags);
   return recording;
 }
 
@@ -137,8 +129,7 @@ void expect_undisturbed(const std::filesystem::path& recording, const std::strin
                         const std::vector<std::string>& flags) {
   const TemporaryFolder folder;
   const auto alone = fly_in_process(scenario_file, folder / "alone", flags);
-  Process verify({program("sls_verify"), recording, alone});
-  EXPECT_EQ(verify.wait(), 0) << verify.output();
+  expect_exit({program("sls_verify"), recording, alone});
 }
 
 std::string make_qos_with_history(const TemporaryFolder& folder, const std::string& base,

@@ -1,6 +1,8 @@
 /// A flight of the three real programs in a DDS domain of its own, and its recording.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <Eigen/Core>
 #include <filesystem>
 #include <map>
@@ -15,17 +17,45 @@
 namespace sls::test {
 
 struct FlightOptions {
-  std::string qos_file;             ///< default: the programs' default
-  std::vector<std::string> server;  ///< further flags
-  std::vector<std::string> client;
+  std::string qos_file;  ///< default: the programs' default
+  Words server;          ///< further flags
+  Words client;
   /// Put before the command line of a program, such as `Network::on("server")` or {"env", "A=B"}.
-  std::map<std::string, std::vector<std::string>> before = {};
+  std::map<std::string, Words> before = {};
 };
+
+/// The command line of one of the programs in `domain`.
+Words make_command(const std::string& name, int domain, const Words& flags,
+                   const std::string& qos_file = {});
+
+/// Command prefix of a program that loses this share of its datagrams, also received ones.
+Words lossy(int percent);
+
+/// Programs that are started one by one in a DDS domain of their own, and their recording.
+class Programs {
+ public:
+  explicit Programs(const FlightOptions& options = {}) : options_(options) {}
+
+  /// Its command line follows the options' `before` of this program, and `before`.
+  std::unique_ptr<Process> start(const std::string& name, const Words& flags,
+                                 const Words& before = {}, const std::string& qos_file = {}) const;
+
+  std::filesystem::path recording() const { return folder / "recording"; }
+
+  TemporaryFolder folder;
+  OwnDomain domain;
+
+ private:
+  const FlightOptions options_;
+};
+
+/// A test of such programs.
+class ProgramsTest : public testing::Test, protected Programs {};
 
 /// Further flags of a server: 32,000 steps of the figure eight instead of 8,000. An idle machine
 /// flies 20,000 steps/s in lockstep: a shorter flight may be over before a test has killed, stopped
 /// or cut off a program.
-inline const std::vector<std::string> kManySteps = {"--period-s", "0.001"};
+inline const Words kManySteps = {"--period-s", "0.001"};
 
 /// Writes a figure eight of 16,000 steps, with `changes`, whose rows are on the disk within 20 ms:
 /// a test sees early that it flies, and has half of its time left on a machine that flies 40,000
@@ -34,7 +64,7 @@ std::string make_long_scenario(const TemporaryFolder& folder,
                                std::vector<std::pair<std::string, std::string>> changes = {});
 
 /// Starts recorder, server and client on `scenario_file`.
-class Flight {
+class Flight : public Programs {
  public:
   explicit Flight(const std::string& scenario_file, const FlightOptions& options = {});
 
@@ -48,22 +78,8 @@ class Flight {
   /// Output of all three, for messages.
   std::string outputs() const;
 
-  const std::filesystem::path& recording() const { return recording_; }
-
-  TemporaryFolder folder;
-  OwnDomain domain;
-
- private:
-  std::filesystem::path recording_;
-
- public:
   std::unique_ptr<Process> recorder, server, client;
 };
-
-/// The command line of one of the programs in `domain`.
-std::vector<std::string> make_command(const std::string& name, int domain,
-                                      const std::vector<std::string>& flags,
-                                      const std::string& qos_file = {});
 
 /// A QoS file in `folder`: the shipped `base` with a history of `batches` samples of sls/record.
 std::string make_qos_with_history(const TemporaryFolder& folder, const std::string& base,

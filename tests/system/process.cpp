@@ -1,6 +1,7 @@
 #include "tests/system/process.hpp"
 
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -57,6 +58,29 @@ void Process::kill() {
   if (!is_running()) return;
   kill_process(id_);
   wait(std::chrono::seconds(10));
+}
+
+bool wait_for_text(const Process& process, const std::string& text) {
+  return wait_until([&] { return holds(process.output(), text); });
+}
+
+void expect_success(const std::vector<Process*>& processes) {
+  std::string outputs;
+  for (Process* process : processes) process->wait();
+  for (const Process* process : processes) outputs += process->output();
+  for (Process* process : processes) EXPECT_EQ(process->wait({}), 0) << outputs;
+}
+
+Outcome run(const Words& command, std::chrono::milliseconds limit) {
+  Process process(command);
+  const auto code = process.wait(limit);
+  return {code, process.output()};
+}
+
+std::string expect_exit(const Words& command, int code) {
+  const Outcome outcome = run(command);
+  EXPECT_EQ(outcome.code, code) << command.front() << "\n" << outcome.output;
+  return outcome.output;
 }
 
 std::vector<std::filesystem::path> find_shared_memory(pid_t id) {

@@ -18,9 +18,10 @@
 
 namespace sls::test {
 
+using Words = std::vector<std::string>;
+
 /// `words`, then `more`: of command lines.
-inline std::vector<std::string> operator+(std::vector<std::string> words,
-                                          const std::vector<std::string>& more) {
+inline Words operator+(Words words, const Words& more) {
   words.insert(words.end(), more.begin(), more.end());
   return words;
 }
@@ -50,6 +51,20 @@ class Process {
   pid_t id_ = -1;
   std::optional<int> exit_code_;
 };
+
+/// Waits until the process has printed `text`.
+bool wait_for_text(const Process& process, const std::string& text);
+
+/// Waits for each, and expects exit code 0.
+void expect_success(const std::vector<Process*>& processes);
+
+struct Outcome {
+  std::optional<int> code;  ///< nothing if it did not end in time
+  std::string output;
+};
+Outcome run(const Words& command, std::chrono::milliseconds limit = std::chrono::seconds(240));
+/// Runs `command`, expects that exit code, and returns the output.
+std::string expect_exit(const Words& command, int code = 0);
 
 /// Files of the process's own segment in /dev/shm. They remain if the process is killed.
 std::vector<std::filesystem::path> find_shared_memory(pid_t id);

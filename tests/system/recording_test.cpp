@@ -27,30 +27,21 @@ std::uint64_t count_bytes(const fs::path& folder) {
   return bytes;
 }
 
-class RecordingFilesTest : public testing::Test {
- protected:
-  std::unique_ptr<Process> start(const char* name, const std::vector<std::string>& flags) const {
-    return std::make_unique<Process>(make_command(name, domain_.number(), flags));
-  }
-  std::string recording() const { return folder_ / "recording"; }
-
-  const TemporaryFolder folder_;
-  const OwnDomain domain_;
-};
+class RecordingFilesTest : public ProgramsTest {};
 
 // The files must not be read once for each of the 40 vehicles.
 TEST_F(RecordingFilesTest, OfAFleetAreReadAFewTimesToResumeAndToVerifyHoweverManyVehiclesFly) {
-  const std::string file = make_scenario(folder_, {{"for_s: 2", "for_s: 8"}});
+  const std::string file = make_scenario(folder, {{"for_s: 2", "for_s: 8"}});
   write_bytes(file, read_file(file) + "vehicles: 40\n");
   auto recorder = start("recorder", {"--out", recording(), "--resume"});
   const auto server = start("sim_server", {"--scenario", file});
   const auto client = start("control_client", {"--scenario", file});
-  ASSERT_TRUE(wait_until([&] { return read_file(recording() + "/command.csv").size() > 300'000; }))
+  ASSERT_TRUE(wait_until([&] { return read_file(recording() / "command.csv").size() > 300'000; }))
       << server->output();
   recorder->kill();
   std::uint64_t rows = 0;
   for (const char* name : {"state.csv", "command.csv", "reference.csv"})
-    rows += fs::file_size(fs::path(recording()) / name);
+    rows += fs::file_size(recording() / name);
 
   // Allowance for other files, such as settings: a recorder that finds no server reads 50 kB.
   constexpr std::uint64_t kStart = 1 << 20;
@@ -74,14 +65,14 @@ TEST_F(RecordingFilesTest, OfAFleetAreReadAFewTimesToResumeAndToVerifyHoweverMan
 
 // After a power cut, any part of the data not yet on the disk may be missing, also the renaming.
 TEST_F(RecordingFilesTest, AreOnTheDiskBeforeTheManifestThatListsThem) {
-  const std::string log = folder_ / "log";
+  const std::string log = folder / "log";
   FlightOptions options;
   options.before["recorder"] = {"env", std::string("LD_PRELOAD=") + SLS_SYNC_SHIM,
                                 "SLS_SYNC_LOG=" + log};
   Flight flight(scenario("short"), options);
   flight.expect_success();
-  const std::string folder = flight.recording();
-  const std::string part = folder + "/manifest.json.part", manifest = folder + "/manifest.json";
+  const std::string made = flight.recording();
+  const std::string part = made + "/manifest.json.part", manifest = made + "/manifest.json";
 
   std::istringstream lines(read_file(log));
   std::map<std::string, std::uint64_t> synced;  // bytes per file since the last renaming
@@ -94,36 +85,34 @@ TEST_F(RecordingFilesTest, AreOnTheDiskBeforeTheManifestThatListsThem) {
     }
     ASSERT_EQ(from + ' ' + to, part + ' ' + manifest);
     EXPECT_EQ(synced.count(part), 1u) << "after renaming " << renamings;
-    EXPECT_TRUE(renamings == 0 || synced.count(folder) == 1) << "after renaming " << renamings;
+    EXPECT_TRUE(renamings == 0 || synced.count(made) == 1) << "after renaming " << renamings;
     ++renamings;
     before_the_last = std::exchange(synced, {});
   }
   EXPECT_GE(renamings, 2) << "one when it begins, one at the end";
-  EXPECT_EQ(synced.count(folder), 1u);
+  EXPECT_EQ(synced.count(made), 1u);
   before_the_last[manifest] = before_the_last[part];
-  const auto files = read_manifest(folder).at("files");
+  const auto files = read_manifest(made).at("files");
   EXPECT_EQ(files.size(), 7u);
-  for (const auto& entry : fs::directory_iterator(folder))
+  for (const auto& entry : fs::directory_iterator(made))
     EXPECT_EQ(before_the_last[entry.path()], entry.file_size()) << entry.path();
 }
 
 TEST_F(RecordingFilesTest, WithoutAStepAreEqualToNothing) {
   const auto recorder = start("recorder", {"--out", recording()});
   const auto server = start("sim_server", {"--scenario", scenario("short")});  // waits for a client
-  ASSERT_TRUE(wait_until([&] { return fs::exists(recording() + "/manifest.json"); }))
+  ASSERT_TRUE(wait_until([&] { return fs::exists(recording() / "manifest.json"); }))
       << recorder->output() << server->output();
   recorder->send(SIGTERM);
   server->send(SIGTERM);
   EXPECT_EQ(recorder->wait(), 143) << recorder->output();
   EXPECT_EQ(server->wait(), 143) << server->output();
 
-  Process alone({program("sls_verify"), recording()});
-  EXPECT_EQ(alone.wait(), 0) << alone.output();
-  EXPECT_TRUE(holds(alone.output(), "matches its manifest: 0 steps")) << alone.output();
-  fs::copy(recording(), folder_ / "copy");
-  Process both({program("sls_verify"), recording(), folder_ / "copy"});
-  EXPECT_EQ(both.wait(), 1) << both.output();
-  EXPECT_TRUE(holds(both.output(), "neither A nor B holds a step")) << both.output();
+  const std::string alone = expect_exit({program("sls_verify"), recording()});
+  EXPECT_TRUE(holds(alone, "matches its manifest: 0 steps")) << alone;
+  fs::copy(recording(), folder / "copy");
+  const std::string both = expect_exit({program("sls_verify"), recording(), folder / "copy"}, 1);
+  EXPECT_TRUE(holds(both, "neither A nor B holds a step")) << both;
 }
 
 }  // namespace

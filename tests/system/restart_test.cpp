@@ -9,29 +9,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class RestartTest : public ::testing::Test {
+class RestartTest : public ProgramsTest {
  protected:
-  std::unique_ptr<Process> start(const char* name, const std::vector<std::string>& flags) const {
-    return std::make_unique<Process>(make_command(name, domain_.number(), flags));
-  }
   std::unique_ptr<Process> start_server() const {
     return start("sim_server", {"--scenario", file_});
   }
-  std::unique_ptr<Process> start_client(const std::vector<std::string>& further = {}) const {
-    return start("control_client", std::vector<std::string>{"--scenario", file_} + further);
+  std::unique_ptr<Process> start_client(const Words& further = {}) const {
+    return start("control_client", Words{"--scenario", file_} + further);
   }
-  std::unique_ptr<Process> start_recorder(const std::vector<std::string>& further = {}) const {
-    return start("recorder", std::vector<std::string>{"--out", recording()} + further);
+  std::unique_ptr<Process> start_recorder(const Words& further = {}) const {
+    return start("recorder", Words{"--out", recording()} + further);
   }
-  std::string recording() const { return folder_ / "recording"; }
   /// Waits for whole steps: commands are flushed last.
   bool wait_for_rows() const {
-    return wait_until([&] { return read_file(recording() + "/command.csv").size() > 20'000; });
+    return wait_until([&] { return read_file(recording() / "command.csv").size() > 20'000; });
   }
 
-  TemporaryFolder folder_;
-  OwnDomain domain_;
-  std::string file_ = make_long_scenario(folder_);
+  std::string file_ = make_long_scenario(folder);
 };
 
 TEST_F(RestartTest, AKilledClientAndAKilledRecorderGoOnAndTogetherNothingIsMissing) {
@@ -43,11 +37,9 @@ TEST_F(RestartTest, AKilledClientAndAKilledRecorderGoOnAndTogetherNothingIsMissi
   recorder->kill();
   client = start_client();
   recorder = start_recorder({"--resume"});
-  EXPECT_EQ(server->wait(), 0) << server->output();
-  EXPECT_EQ(client->wait(), 0) << client->output();
-  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  expect_success({server.get(), client.get(), recorder.get()});
   EXPECT_FALSE(read_manifest(recording()).at("complete").get<bool>()) << "the first segment";
-  const auto manifest = read_manifest(recording() + "/segment-2");
+  const auto manifest = read_manifest(recording() / "segment-2");
   EXPECT_TRUE(manifest.at("complete").get<bool>()) << manifest;
   EXPECT_EQ(manifest.at("segment").at("number"), 2);
   EXPECT_GT(manifest.at("segment").at("first_step").get<int>(), 0);
@@ -61,9 +53,7 @@ TEST_F(RestartTest, AKilledServerIsReplacedAndProgramsWithFollowFlyTheNewRun) {
   ASSERT_TRUE(wait_for_rows()) << server->output();
   server->kill();
   server = start_server();
-  EXPECT_EQ(server->wait(), 0) << server->output() << client->output() << recorder->output();
-  EXPECT_EQ(client->wait(), 0) << client->output();
-  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  expect_success({server.get(), client.get(), recorder.get()});
   EXPECT_TRUE(holds(client->output(), "was replaced by run")) << client->output();
   EXPECT_TRUE(holds(recorder->output(), "was replaced by run")) << recorder->output();
   const auto first = read_manifest(recording());
@@ -82,7 +72,7 @@ TEST_F(RestartTest, StaleSharedMemoryStopsNoStart) {
   std::vector<fs::path> left;
   for (int i = 0; i < 3; ++i) {
     const auto server = start_server();
-    ASSERT_TRUE(wait_until([&] { return holds(server->output(), "run "); })) << server->output();
+    ASSERT_TRUE(wait_for_text(*server, "run ")) << server->output();
     const auto own = find_shared_memory(server->id());
     EXPECT_FALSE(own.empty());
     left.insert(left.end(), own.begin(), own.end());
@@ -91,9 +81,7 @@ TEST_F(RestartTest, StaleSharedMemoryStopsNoStart) {
   }
   for (const auto& file : left) EXPECT_TRUE(fs::exists(file)) << file;
   const auto recorder = start_recorder(), server = start_server(), client = start_client();
-  EXPECT_EQ(server->wait(), 0) << server->output();
-  EXPECT_EQ(client->wait(), 0) << client->output();
-  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  expect_success({server.get(), client.get(), recorder.get()});
   for (const auto& file : left) fs::remove(file);
 }
 

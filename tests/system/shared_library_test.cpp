@@ -40,16 +40,6 @@ std::string make_autopilot_scenario(const TemporaryFolder& folder, const std::st
         "autopilot:\n  model: " + kAutopilot + "\n  parameters: { " + parameters + " }\nsync:"}});
 }
 
-struct Outcome {
-  std::optional<int> exit_code;
-  std::string output;
-};
-Outcome run(const std::vector<std::string>& command) {
-  Process process(command);
-  const auto exit_code = process.wait();
-  return {exit_code, process.output()};
-}
-
 class CrashTest : public testing::TestWithParam<std::pair<const char*, int>> {
  protected:
   const std::string how_ = GetParam().first;
@@ -63,17 +53,17 @@ TEST_P(CrashTest, IsNamedWithLibraryFunctionVehicleAndStep) {
     return run({program("closed_loop"), "--scenario", file});
   };
   Outcome outcome = fly(make_controller_scenario(folder_, "in: answer, at: 5, do: " + how_));
-  EXPECT_EQ(outcome.exit_code, 128 + signal_);
+  EXPECT_EQ(outcome.code, 128 + signal_);
   EXPECT_EQ(outcome.output,
             "closed_loop: error: " + kController + ": answer, vehicle 0, step 5" + crashed_);
 
   outcome = fly(make_plant_scenario(folder_, "in: advance, at: 8, do: " + how_));
-  EXPECT_EQ(outcome.exit_code, 128 + signal_);
+  EXPECT_EQ(outcome.code, 128 + signal_);
   EXPECT_EQ(outcome.output,
             "closed_loop: error: " + kPlant + ": advance, vehicle 0, step 8" + crashed_);
 
   outcome = fly(make_autopilot_scenario(folder_, "in: step, at: 8, do: " + how_));
-  EXPECT_EQ(outcome.exit_code, 128 + signal_);
+  EXPECT_EQ(outcome.code, 128 + signal_);
   EXPECT_EQ(outcome.output,
             "closed_loop: error: " + kAutopilot + ": step, vehicle 0, step 8" + crashed_);
 }
@@ -82,7 +72,7 @@ TEST_P(CrashTest, InOneProcessKeepsTheRowsBeforeIt) {
   const Outcome outcome =
       run({program("closed_loop"), "--out", folder_ / "recording", "--scenario",
            make_controller_scenario(folder_, "in: answer, at: 300, do: " + how_)});
-  EXPECT_EQ(outcome.exit_code, 128 + signal_);
+  EXPECT_EQ(outcome.code, 128 + signal_);
   const std::string line = kController + ": answer, vehicle 0, step 300" + crashed_;
   EXPECT_TRUE(holds(outcome.output, "closed_loop: error: " + line)) << outcome.output;
   const auto manifest = read_manifest(folder_ / "recording");
@@ -98,7 +88,7 @@ TEST(SharedLibraryProgramTest, AnExitInsideALibraryIsNamedAndFails) {
       kController + ": answer, vehicle 0, step 300: ended the program or its thread";
   const Outcome outcome =
       run({program("closed_loop"), "--out", folder / "recording", "--scenario", file});
-  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.code, 1);
   EXPECT_TRUE(holds(outcome.output, "closed_loop: error: " + line + "\n")) << outcome.output;
   EXPECT_EQ(read_manifest(folder / "recording").at("reason"), line);
   EXPECT_EQ(Table(folder / "recording/state.csv").rows(), 300u);
@@ -117,13 +107,13 @@ TEST(SharedLibraryProgramTest, ACrashBeforeTheFlightIsNamedByServerAndClient) {
   OwnDomain domain;
   const std::string plant = make_plant_scenario(folder, "in: create, do: crash");
   Outcome outcome = run(make_command("sim_server", domain.number(), {"--scenario", plant}));
-  EXPECT_EQ(outcome.exit_code, 128 + SIGSEGV);
+  EXPECT_EQ(outcome.code, 128 + SIGSEGV);
   EXPECT_EQ(outcome.output,
             "sim_server: error: " + kPlant + ": create, vehicle 0, step 0: crashed (signal 11)\n");
 
   const std::string law = make_controller_scenario(folder, "in: create, do: crash");
   outcome = run(make_command("control_client", domain.number(), {"--scenario", law}));
-  EXPECT_EQ(outcome.exit_code, 128 + SIGSEGV);
+  EXPECT_EQ(outcome.code, 128 + SIGSEGV);
   EXPECT_EQ(outcome.output, "control_client: error: " + kController +
                                 ": create, vehicle 0, step 0: crashed (signal 11)\n");
 }
@@ -133,7 +123,7 @@ TEST(SharedLibraryProgramTest, ALibraryThatIsRefusedEndsServerAndClientWithItsLi
   const std::string plant = make_plant_scenario(folder, "in: create");
   const std::string refusal = ": failed without saying why\n";
   Outcome outcome = run({program("sim_server"), "--check", "--scenario", plant});
-  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(outcome.code, 2);
   EXPECT_EQ(outcome.output,
             "sim_server: error: " + plant + ":6: plant.parameters: " + kPlant + refusal);
 
@@ -143,7 +133,7 @@ TEST(SharedLibraryProgramTest, ALibraryThatIsRefusedEndsServerAndClientWithItsLi
     std::vector<std::string> whole = command;
     whole.insert(whole.end(), {"--scenario", autopilot});
     outcome = run(whole);
-    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.code, 2);
     EXPECT_TRUE(holds(outcome.output, ": error: " + autopilot +
                                           ":14: autopilot.parameters: " + kAutopilot + refusal))
         << outcome.output;
@@ -152,7 +142,7 @@ TEST(SharedLibraryProgramTest, ALibraryThatIsRefusedEndsServerAndClientWithItsLi
   const std::string law = make_controller_scenario(folder, "in: create");
   for (const std::string name : {"control_client", "closed_loop"}) {
     outcome = run({program(name), "--scenario", law});
-    EXPECT_EQ(outcome.exit_code, 2);
+    EXPECT_EQ(outcome.code, 2);
     EXPECT_EQ(outcome.output,
               name + ": error: " + law + ":11: controller.parameters: " + kController + refusal);
   }
@@ -164,9 +154,9 @@ TEST(SharedLibraryProgramTest, ALibraryThatIsRefusedLeavesTheRecordingThatIsTher
     return run({program("closed_loop"), "--out", folder / "recording", "--force", "--scenario",
                 make_controller_scenario(folder, parameters)});
   };
-  EXPECT_EQ(fly("in: nothing").exit_code, 0);
+  EXPECT_EQ(fly("in: nothing").code, 0);
   const std::string manifest = read_bytes(folder / "recording/manifest.json");
-  EXPECT_EQ(fly("in: create").exit_code, 2);
+  EXPECT_EQ(fly("in: create").code, 2);
   EXPECT_EQ(read_bytes(folder / "recording/manifest.json"), manifest);
 }
 
@@ -185,7 +175,7 @@ TEST(SharedLibraryProgramTest, AnErrorInDestroyIsNamedAndHarmsNoFlight) {
   TemporaryFolder folder;
   const Outcome outcome = run({program("closed_loop"), "--scenario",
                                make_controller_scenario(folder, "in: destroy, do: throw")});
-  EXPECT_EQ(outcome.exit_code, 0);
+  EXPECT_EQ(outcome.code, 0);
   EXPECT_TRUE(holds(outcome.output, "closed_loop: warning: " + kController +
                                         ": destroy, vehicle 0, step 0: threw an exception: out of "
                                         "luck\n"))
@@ -195,9 +185,9 @@ TEST(SharedLibraryProgramTest, AnErrorInDestroyIsNamedAndHarmsNoFlight) {
 TEST(SharedLibraryProgramTest, CheckPurityLooksBeyondTheFirst100Steps) {
   TemporaryFolder folder;
   const std::string file = make_controller_scenario(folder, "in: answer, at: 150, do: remember");
-  EXPECT_EQ(run({program("closed_loop"), "--scenario", file}).exit_code, 0);
+  EXPECT_EQ(run({program("closed_loop"), "--scenario", file}).code, 0);
   const Outcome outcome = run({program("closed_loop"), "--scenario", file, "--check-purity"});
-  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.code, 1);
   EXPECT_TRUE(holds(outcome.output, kController + ": vehicle 0, step 150: expected equal answers"))
       << outcome.output;
 }
@@ -207,7 +197,7 @@ TEST(SharedLibraryProgramTest, AFailedRecordingHoldsTheLibrarysMessage) {
   const Outcome outcome = run({program("closed_loop"), "--out", folder / "recording", "--scenario",
                                make_controller_scenario(folder, "in: answer, at: 5, do: fail")});
   const std::string message = kController + ": answer, vehicle 0, step 5: no solution after 20 ";
-  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(outcome.code, 1);
   EXPECT_TRUE(holds(outcome.output, message)) << outcome.output;
   const std::string statuses = read_bytes(folder / "recording/status.csv");
   EXPECT_TRUE(holds(statuses, message)) << statuses;

@@ -12,43 +12,23 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct Outcome {
-  int exit_code = -1;
-  std::string output;
-};
-
-Outcome run(const std::vector<std::string>& command) {
-  Process process(command);
-  const auto code = process.wait();
-  return {code.value_or(-1), process.output()};
-}
-
 /// Expects one line that begins with the program's name and "error:" and contains `cause`.
-void expect_refused(const std::vector<std::string>& command, int exit_code,
-                    const std::string& cause) {
-  const Outcome outcome = run(command);
-  EXPECT_EQ(outcome.exit_code, exit_code) << outcome.output;
-  EXPECT_EQ(std::count(outcome.output.begin(), outcome.output.end(), '\n'), 1) << outcome.output;
-  EXPECT_TRUE(std::regex_search(outcome.output, std::regex("^[a-z_]+: error: "))) << outcome.output;
-  EXPECT_NE(outcome.output.find(cause), std::string::npos)
-      << "expected '" << cause << "' in: " << outcome.output;
+void expect_refused(const Words& command, int exit_code, const std::string& cause) {
+  const std::string said = expect_exit(command, exit_code);
+  EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
+  EXPECT_TRUE(std::regex_search(said, std::regex("^[a-z_]+: error: "))) << said;
+  EXPECT_TRUE(holds(said, cause)) << "expected '" << cause << "' in: " << said;
 }
 
-std::vector<std::string> server_with(const std::vector<std::string>& flags) {
-  std::vector<std::string> command = {program("sim_server")};
-  command.insert(command.end(), flags.begin(), flags.end());
-  return command;
-}
+Words server_with(const Words& flags) { return Words{program("sim_server")} + flags; }
 
 TEST(UsageTest, EveryProgramPrintsHelpWithDefaultsAndItsVersion) {
   for (const char* name : {"sim_server", "control_client", "recorder"}) {
-    const Outcome help = run({program(name), "--help"});
-    EXPECT_EQ(help.exit_code, 0);
+    const std::string help = expect_exit({program(name), "--help"});
     for (const char* flag : {"--qos", "--domain", "--log-level", "--version", "info"})
-      EXPECT_NE(help.output.find(flag), std::string::npos) << name << " " << flag << help.output;
-    const Outcome version = run({program(name), "--version"});
-    EXPECT_EQ(version.exit_code, 0);
-    EXPECT_TRUE(std::regex_match(version.output, std::regex("sls \\d+\\.\\d+\\.\\d+\n")));
+      EXPECT_TRUE(holds(help, flag)) << name << " " << flag << help;
+    EXPECT_TRUE(std::regex_match(expect_exit({program(name), "--version"}),
+                                 std::regex("sls \\d+\\.\\d+\\.\\d+\n")));
   }
 }
 
@@ -129,13 +109,11 @@ TEST(UsageTest, UnusableQosFilesAreRefusedByEveryProgram) {
   int run_number = 0;
   for (const char* name : {"sim_server", "control_client", "recorder"}) {
     const auto refuse = [&](const std::string& file, const std::string& cause) {
-      std::vector<std::string> command = {program(name), "--qos", file};
-      if (std::string(name) == "recorder")
-        command.insert(command.end(),
-                       {"--out", folder / ("recording" + std::to_string(run_number++))});
-      else
-        command.insert(command.end(), {"--scenario", scenario("short")});
-      expect_refused(command, 2, cause);
+      const bool records = std::string(name) == "recorder";
+      const std::string out = folder / ("recording" + std::to_string(run_number++));
+      expect_refused(Words{program(name), "--qos", file} +
+                         (records ? Words{"--out", out} : Words{"--scenario", scenario("short")}),
+                     2, cause);
     };
     refuse(folder / "none.xml", "none.xml: ");
     refuse(folder.path(), "got a directory");
@@ -159,25 +137,20 @@ TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithFor
   write_bytes(folder / "old/state.csv", "old");
   expect_refused({program("recorder"), "--out", folder / "old", "--check"}, 2, "--force");
   EXPECT_EQ(read_file(folder / "old/state.csv"), "old");
-  EXPECT_EQ(run({program("recorder"), "--out", folder / "old", "--force", "--check"}).exit_code, 0);
+  expect_exit({program("recorder"), "--out", folder / "old", "--force", "--check"});
   EXPECT_FALSE(fs::exists(folder / "old/state.csv"));
 }
 
 TEST(UsageTest, TooLittleSharedMemoryIsNamedBeforeTheFirstSample) {
   if (geteuid() != 0) GTEST_SKIP() << "skipped: only root can mount another /dev/shm";
   const TemporaryFolder folder;
-  for (const auto& flags : {std::vector<std::string>{program("sim_server"), "--scenario"},
-                            {program("control_client"), "--scenario"},
-                            {program("recorder"), "--out"}}) {
-    std::vector<std::string> command = {
-        "/usr/bin/unshare", "--mount", "sh", "-c",
-        "mount -t tmpfs -o size=1m tmpfs /dev/shm && exec \"$0\" \"$@\""};
-    command.insert(command.end(), flags.begin(), flags.end());
-    command.push_back(flags.back() == "--out" ? (folder / "recording").string()
-                                              : scenario("short"));
-    expect_refused(command, 1,
+  const Words limited = {"/usr/bin/unshare", "--mount", "sh", "-c",
+                         "mount -t tmpfs -o size=1m tmpfs /dev/shm && exec \"$0\" \"$@\""};
+  for (const Words& command : {server_with({"--scenario", scenario("short")}),
+                               {program("control_client"), "--scenario", scenario("short")},
+                               {program("recorder"), "--out", folder / "recording"}})
+    expect_refused(limited + command, 1,
                    "/dev/shm: expected 10.7 MB free, got 1.0 MB: mount -o remount,size=64M");
-  }
 }
 
 TEST(UsageTest, ClientWithAnotherScenarioIsRefusedWithBothHashes) {

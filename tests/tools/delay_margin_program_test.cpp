@@ -9,15 +9,8 @@
 namespace sls::test {
 namespace {
 
-std::string run(const std::vector<std::string>& command, int expected_exit_code) {
-  Process process(command);
-  EXPECT_EQ(process.wait(), expected_exit_code) << process.output();
-  return process.output();
-}
-
-void expect_refused(const std::vector<std::string>& command, int exit_code,
-                    const std::string& cause) {
-  const std::string output = run(command, exit_code);
+void expect_refused(const Words& command, int exit_code, const std::string& cause) {
+  const std::string output = expect_exit(command, exit_code);
   EXPECT_EQ(std::count(output.begin(), output.end(), '\n'), 1) << output;
   EXPECT_NE(output.find("error: "), std::string::npos) << output;
   EXPECT_NE(output.find(cause), std::string::npos) << output;
@@ -25,28 +18,25 @@ void expect_refused(const std::vector<std::string>& command, int exit_code,
 
 std::string launcher() { return std::string(SLS_SOURCE_DIR) + "/sls"; }
 
-std::vector<std::string> program_with(const std::vector<std::string>& flags) {
-  std::vector<std::string> command = {program("delay_margin")};
-  command.insert(command.end(), flags.begin(), flags.end());
-  return command;
-}
+Words program_with(const Words& flags) { return Words{program("delay_margin")} + flags; }
 
 TEST(DelayMarginProgramTest, PrintsATableAndTheMarginTheSameEveryTime) {
   const auto command = program_with({"--scenario", scenario("matlab_setpoint_3")});
-  const std::string output = run(command, 0);
+  const std::string output = expect_exit(command);
   const std::regex table(
       "delay \\(s\\) +periods +worst error \\(m\\) +rms error \\(m\\) +outcome\n"
       "( +[0-9.]+ +[0-9]+ +[0-9.]+ +[0-9.]+  (held|lost: .+, at [0-9.]+ s)\n)+"
       "holds with [0-9.]+ s, loses the load with [0-9.]+ s\n");
   EXPECT_TRUE(std::regex_match(output, table)) << output;
-  EXPECT_EQ(run(command, 0), output);
+  EXPECT_EQ(expect_exit(command), output);
 }
 
 TEST(DelayMarginProgramTest, TheLauncherTakesNamesPathsAndPeriods) {
   setenv("SLS_BUILD", SLS_BUILD_DIR, 1);
-  const std::string by_name = run({launcher(), "delay-margin", "short"}, 0);
-  EXPECT_EQ(run({launcher(), "delay-margin", scenario("short")}, 0), by_name);
-  const std::string at_8_ms = run({launcher(), "delay-margin", "short", "--period-s", "0.008"}, 0);
+  const std::string by_name = expect_exit({launcher(), "delay-margin", "short"}, 0);
+  EXPECT_EQ(expect_exit({launcher(), "delay-margin", scenario("short")}, 0), by_name);
+  const std::string at_8_ms =
+      expect_exit({launcher(), "delay-margin", "short", "--period-s", "0.008"}, 0);
   EXPECT_NE(at_8_ms.find("\n    0.008        1 "), std::string::npos) << at_8_ms;
   expect_refused({launcher(), "delay-margin"}, 2, "expected a scenario");
   expect_refused({launcher(), "delay-margin", "short", "setpoints"}, 2, "expected one scenario");

@@ -107,7 +107,16 @@ def test_hosts_that_lose_packets_and_are_cut_give_the_same_bytes(check):
     assert not [path for path in Path("/run/netns").glob(f"sls-check-{os.getpid()}-*")]
 
 
-def test_a_killed_controller_is_replaced_by_its_standby(check):
+@pytest.fixture
+def one_core():
+    """The test and its programs run on one core."""
+    before = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, {min(before)})
+    yield
+    os.sched_setaffinity(0, before)
+
+
+def test_a_killed_controller_is_replaced_by_its_standby(check, one_core):
     code, flights, said = check("", "--placement", "shm", "--under", "kill=controller,busy", scenario="figure_eight",
                                 expect="{ event: take_over, min: 1, max: 1 }")
     assert code == 0, said

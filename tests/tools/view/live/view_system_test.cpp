@@ -14,10 +14,9 @@
 namespace sls::test {
 namespace {
 
-std::unique_ptr<Process> start_viewer(const OwnDomain& domain,
-                                      std::vector<std::string> flags = {}) {
-  flags.insert(flags.end(), {"--port", "0"});
-  return std::make_unique<Process>(make_command("sls_view", domain.number(), flags));
+std::unique_ptr<Process> start_viewer(const OwnDomain& domain, const Words& flags = {}) {
+  return std::make_unique<Process>(
+      make_command("sls_view", domain.number(), flags + Words{"--port", "0"}));
 }
 
 const std::vector<std::string> kRealtime = {"--mode", "realtime"};
@@ -70,26 +69,21 @@ TEST(ViewSystemTest, APageSeesTheFlightThatIsRecorded) {
 
 /// A stopped viewer is the worst case: it reads nothing from its sockets.
 TEST(ViewSystemTest, ThreeViewersOfWhichOneIsStoppedChangeNothing) {
-  const OwnDomain other;  // the flight below must not begin before its viewers
-  const TemporaryFolder folder;
+  const Programs programs;  // the flight must not begin before its viewers
   std::vector<std::unique_ptr<Process>> viewers;
   std::vector<std::unique_ptr<PageClient>> pages;
   for (int i = 0; i < 3; ++i) {
-    viewers.push_back(start_viewer(other));
+    viewers.push_back(start_viewer(programs.domain));
     pages.push_back(std::make_unique<PageClient>(wait_for_port(*viewers.back())));
   }
-  const auto start = [&](const char* name, const std::vector<std::string>& flags) {
-    return std::make_unique<Process>(make_command(name, other.number(), flags));
-  };
-  const auto recording = folder / "recording";
-  const auto recorder = start("recorder", {"--out", recording.string()});
-  const auto server = start("sim_server", {"--scenario", scenario("figure_eight")});
-  const auto client = start("control_client", {"--scenario", scenario("figure_eight")});
+  const auto recording = programs.recording();
+  const Words flags = {"--scenario", scenario("figure_eight")};
+  const auto recorder = programs.start("recorder", {"--out", recording}),
+             server = programs.start("sim_server", flags),
+             client = programs.start("control_client", flags);
   ASSERT_TRUE(pages[0]->wait_for_step(10)) << viewers[0]->output() << server->output();
   viewers[0]->send(SIGSTOP);
-  EXPECT_EQ(server->wait(), 0) << server->output();
-  EXPECT_EQ(client->wait(), 0) << client->output();
-  EXPECT_EQ(recorder->wait(), 0) << recorder->output();
+  expect_success({server.get(), client.get(), recorder.get()});
   EXPECT_TRUE(pages[1]->wait_for_status("phase", "finished"));
   EXPECT_TRUE(pages[2]->wait_for_status("phase", "finished"));
   viewers[0]->send(SIGCONT);

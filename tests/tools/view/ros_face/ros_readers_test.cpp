@@ -20,7 +20,6 @@ namespace {
 using Eigen::Quaterniond;
 using Eigen::Vector3d;
 using nlohmann::json;
-using Words = std::vector<std::string>;
 
 constexpr double kRounding = 1e-12;  // of rotated velocities up to some m/s
 constexpr double kPeriodNs = 4e6;
@@ -102,24 +101,18 @@ std::map<std::pair<int, std::int64_t>, Row> read_rows(const std::filesystem::pat
   return rows;
 }
 
-class RosReadersTest : public testing::Test {
+class RosReadersTest : public ProgramsTest {
  protected:
   void SetUp() override {
     if (!SLS_HAS_CYCLONE)
       GTEST_SKIP() << "built without Cyclone DDS: apt-get install cyclonedds-dev cyclonedds-tools";
   }
 
-  std::unique_ptr<Process> start(const std::string& name, const Words& flags) const {
-    return std::make_unique<Process>(make_command(name, domain_.number(), flags));
-  }
-
   /// Starts viewer and reader; they have discovered each other before a flight starts.
   void start_watching(const Words& vehicles) {
     view_ = start("sls_view", {"--ros", "--port", "0"});
-    Words command = kOnLoopback;
-    command.insert(command.end(), {SLS_ROS_READER, domain_.text()});
-    command.insert(command.end(), vehicles.begin(), vehicles.end());
-    reader_ = std::make_unique<Process>(command);
+    reader_ =
+        std::make_unique<Process>(kOnLoopback + Words{SLS_ROS_READER, domain.text()} + vehicles);
     ASSERT_TRUE(wait_for("{\"topic\":\"rt/tf_static\"")) << outputs();
   }
 
@@ -164,9 +157,7 @@ class RosReadersTest : public testing::Test {
     return text;
   }
 
-  const OwnDomain domain_;
-  const TemporaryFolder folder_;
-  const std::string recording_ = folder_ / "recording";
+  const std::string recording_ = recording();
   std::unique_ptr<Process> view_, reader_, recorder_, server_, client_;
 };
 
@@ -219,7 +210,7 @@ void expect_marker(const json& marker, const Row& row) {
 
 TEST_F(RosReadersTest, EveryTopicOfAFlightOfTwoHasTheNumbersThatWereRecorded) {
   const std::string file = make_scenario(
-      folder_,
+      folder,
       {{"name: multirotor_figure_eight", "name: pair\nvehicles: 2"}, {"for_s: 32", "for_s: 6"}},
       "multirotor_figure_eight");
   start_watching({"0", "1"});
@@ -274,9 +265,9 @@ TEST_F(RosReadersTest, EveryTopicOfAFlightOfTwoHasTheNumbersThatWereRecorded) {
 
 TEST_F(RosReadersTest, ABatchOfAnotherParticipantIsNotPublished) {
   start_watching({"0"});
-  FakeServer server(domain_.number(), 7);
+  FakeServer server(domain.number(), 7);
   server.publish(RunPhase::PHASE_RUNNING);
-  bus::Node other(kQosFile, domain_.number(), "forger");
+  bus::Node other(kQosFile, domain.number(), "forger");
   bus::Writer<RecordBatch> forger(other);
   ASSERT_TRUE(wait_until([&] { return !forger.matched().empty(); })) << "read by the viewer";
   constexpr std::uint64_t kForged = 900'000;
@@ -294,7 +285,7 @@ TEST_F(RosReadersTest, ABatchOfAnotherParticipantIsNotPublished) {
 }
 
 TEST_F(RosReadersTest, ReferencesAreThoseOfTheController) {
-  const std::string file = make_scenario(folder_, {{"for_s: 2", "for_s: 5"}});
+  const std::string file = make_scenario(folder, {{"for_s: 2", "for_s: 5"}});
   start_watching({"0"});
   start_flight(file, {"--mode", "realtime"});
   expect_flight_to_end_well();
@@ -337,7 +328,7 @@ TEST_F(RosReadersTest, EndpointsAreAnnouncedAsThoseOfRos2AndNoneReadsRos) {
 }
 
 TEST_F(RosReadersTest, AFastFlightIsThinnedToAHundredMessagesASecond) {
-  const std::string file = make_scenario(folder_, {{"for_s: 2", "for_s: 60"}});
+  const std::string file = make_scenario(folder, {{"for_s: 2", "for_s: 60"}});
   start_watching({"0"});
   const auto begin = std::chrono::steady_clock::now();
   start_flight(file, {});
