@@ -39,8 +39,13 @@ TEST(ScenarioTest, ReadsTheExampleOfTheDesign) {
   EXPECT_EQ(scenario.text, kDesignExample);
 }
 
+/// Reads `kEveryKey`, writes it and reads that: reader and writer must know each key.
+Scenario read_every_key() {
+  return parse_scenario(to_yaml(parse_scenario(kEveryKey, "file")), "written");
+}
+
 TEST(ScenarioTest, ReadsEveryKeyOfTheVehicles) {
-  const auto vehicles = parse_scenario(kEveryKey, "file").vehicles;
+  const auto vehicles = read_every_key().vehicles;
   ASSERT_EQ(vehicles.size(), 2u);
   EXPECT_EQ(vehicles[0].offset, Vector3d(1, 2, 3));
   EXPECT_EQ(vehicles[0].quad_mass, 1.8);
@@ -53,7 +58,7 @@ TEST(ScenarioTest, ReadsEveryKeyOfTheVehicles) {
 }
 
 TEST(ScenarioTest, ReadsEveryKeyOfThePlant) {
-  const Scenario scenario = parse_scenario(kEveryKey, "file");
+  const Scenario scenario = read_every_key();
   EXPECT_EQ(scenario.name, "every_key");
   EXPECT_EQ(scenario.vehicle, (model::SlungLoadParameters{1.6, 0.16, 0.7, 10.0}));
   const Plant& plant = scenario.plant;
@@ -71,7 +76,7 @@ TEST(ScenarioTest, ReadsEveryKeyOfThePlant) {
 }
 
 TEST(ScenarioTest, ReadsEveryKeyOfSyncAndRecord) {
-  const Scenario scenario = parse_scenario(kEveryKey, "file");
+  const Scenario scenario = read_every_key();
   EXPECT_EQ(scenario.sync.mode, SyncMode::kRealtime);
   EXPECT_EQ(scenario.sync.period_ns, 2'000'000);
   EXPECT_EQ(scenario.sync.real_time_factor, 2.5);
@@ -90,7 +95,7 @@ TEST(ScenarioTest, ReadsEveryKeyOfSyncAndRecord) {
 }
 
 TEST(ScenarioTest, ReadsEveryKeyOfTheController) {
-  const Controller controller = parse_scenario(kEveryKey, "file").controller;
+  const Controller controller = read_every_key().controller;
   EXPECT_EQ(controller.law.name, "qsf");
   const auto& gains = std::get<NamedGains>(controller.own.get<QsfKeys>().gains);
   EXPECT_EQ(gains.horizontal.position, 1.0);
@@ -112,7 +117,7 @@ TEST(ScenarioTest, ReadsEveryKeyOfTheController) {
 }
 
 TEST(ScenarioTest, ReadsEveryKeyOfTheMission) {
-  const auto mission = parse_scenario(kEveryKey, "file").mission;
+  const auto mission = read_every_key().mission;
   ASSERT_EQ(mission.size(), 4u);
   EXPECT_EQ(mission[0].kind, "hold");
   EXPECT_EQ(mission[0].name, "first");
@@ -175,7 +180,7 @@ mission:
 }
 
 TEST(ScenarioTest, ReadsEveryKeyOfTheFaults) {
-  const auto faults = parse_scenario(kEveryKey, "file").faults;
+  const auto faults = read_every_key().faults;
   ASSERT_EQ(faults.size(), 8u);
   std::string kinds;
   for (const Fault& fault : faults)
@@ -218,7 +223,7 @@ TEST(ScenarioTest, ReadsEveryKeyOfTheFaults) {
 }
 
 TEST(ScenarioTest, ReadsEveryKeyOfSensingAndEstimator) {
-  const Scenario scenario = parse_scenario(kEveryKey, "file");
+  const Scenario scenario = read_every_key();
   const Sensing& sensing = scenario.sensing;
   EXPECT_EQ(sensing.body.period_ns, 33'333'333);
   EXPECT_EQ(sensing.body.age_ns, 20'000'000);
