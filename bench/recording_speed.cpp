@@ -14,7 +14,7 @@
 #include "bench/flown_run.hpp"
 #include "common/app/run_main.hpp"
 #include "common/bus/convert.hpp"
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 #include "recorder/columns.hpp"
 #include "recorder/recording.hpp"
 #include "recorder/rows.hpp"
@@ -164,8 +164,7 @@ nlohmann::json measure_recording(const config::Scenario& scenario, std::uint32_t
   std::uintmax_t bytes = 0;
   for (const char* file : kFiles) {
     bytes += fs::file_size(ours.path() / file);
-    if (config::calc_file_sha256(ours.path() / file) !=
-        config::calc_file_sha256(plain.path() / file))
+    if (text::calc_file_sha256(ours.path() / file) != text::calc_file_sha256(plain.path() / file))
       throw app::RunError(std::string(file) + ": the plain file differs from the recording's");
   }
   json["bytes"] = bytes;
