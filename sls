@@ -9,9 +9,9 @@ readonly root
 readonly is_installed build="${SLS_BUILD:-$root/build}"
 readonly flight_packages=(g++ ninja-build cmake libeigen3-dev libsimbody-dev libfastcdr-dev fastddsgen
   default-jre-headless libyaml-cpp-dev libcli11-dev libspdlog-dev nlohmann-json3-dev libssl-dev libtinyxml2-dev
-  libzstd-dev)
+  libzstd-dev zlib1g-dev)
 # Of tools, page, Python module and tests.
-readonly packages=(make libgtest-dev openssl pybind11-dev python3-dev python3-numpy libboost-dev zlib1g-dev)
+readonly packages=(make libgtest-dev openssl pybind11-dev python3-dev python3-numpy libboost-dev)
 readonly fuzz_packages=(clang libclang-rt-dev llvm)
 readonly test_packages=(libgmock-dev libmpfr-dev python3-mpmath iproute2 nftables cyclonedds-dev cyclonedds-tools fastdds-tools libfaketime
   python3-pandas python3-pytest python3-venv slurm-wlm munge python3-distributed chromium mandoc debootstrap mmdebstrap git codespell)

@@ -4,11 +4,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include "control_client/drag_feed_forward.hpp"
+#include "control_client/around_law.hpp"
 #include "control_client/laws/control_law.hpp"
 #include "control_client/mission.hpp"
-#include "control_client/saturation.hpp"
-#include "control_client/state_wiring.hpp"
 
 namespace sls::control {
 

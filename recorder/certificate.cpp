@@ -55,7 +55,7 @@ void Certificate::Vehicle::hash_bytes() {
 }
 
 std::string Certificate::finish() {
-  config::Sha256 flight;
+  text::Sha256 flight;
   for (auto& [id, vehicle] : vehicles_) {
     vehicle.hash_bytes();
     vehicle.bytes.make_room(0);  // kRoom
@@ -64,7 +64,7 @@ std::string Certificate::finish() {
     const auto digest = vehicle.hash.finish();
     flight.add(digest.data(), digest.size());
   }
-  return config::to_hex(flight.finish());
+  return text::to_hex(flight.finish());
 }
 
 }  // namespace sls::record

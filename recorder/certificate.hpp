@@ -6,7 +6,7 @@
 #include <map>
 #include <string>
 
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 #include "recorder/byte_buffer.hpp"
 #include "recorder/rows.hpp"
 
@@ -29,7 +29,7 @@ class Certificate {
   struct Vehicle {
     void hash_bytes();
 
-    config::Sha256 hash;
+    text::Sha256 hash;
     ByteBuffer bytes;  // not hashed yet
   };
 

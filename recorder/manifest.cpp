@@ -17,8 +17,8 @@
 #include "common/bus/names.hpp"
 #include "common/bus/node.hpp"
 #include "common/config/config_error.hpp"
-#include "common/config/sha256.hpp"
 #include "common/sync/servers.hpp"
+#include "common/text/sha256.hpp"
 
 namespace sls::record {
 namespace {
@@ -166,7 +166,7 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
   for (const RecordedFile& file : manifest.files) {
     Json entry;
     if (file.has_rows) entry["rows"] = file.rows;
-    entry["sha256"] = config::calc_file_sha256(file.path);
+    entry["sha256"] = text::calc_file_sha256(file.path);
     files[file.path.filename().string()] = entry;
   }
   for (const RecordedFile& file : manifest.files) sync_to_disk(file.path);

@@ -26,7 +26,7 @@ ManifestFile::File measure(const fs::path& path) {
   std::ifstream stream;
   if (fs::is_regular_file(path, error)) stream.open(path, std::ios::binary);  // a pipe has no end
   if (!stream.is_open()) throw DamagedError(path.string() + ": cannot read, or not there");
-  config::Sha256 hash;
+  text::Sha256 hash;
   std::uint64_t lines = 0;
   bool is_quoted = false;
   std::array<char, 1 << 16> block;
@@ -39,7 +39,7 @@ ManifestFile::File measure(const fs::path& path) {
     }
   }
   if (stream.bad()) throw DamagedError(path.string() + ": cannot read");
-  return {lines > 0 ? lines - 1 : 0, config::to_hex(hash.finish())};
+  return {lines > 0 ? lines - 1 : 0, text::to_hex(hash.finish())};
 }
 
 void check_file(const fs::path& path, const ManifestFile::File& expected,

@@ -2,12 +2,107 @@
 
 #include <spdlog/spdlog.h>
 
-#include "common/app/command_line.hpp"
+#include <algorithm>
+#include <regex>
+#include <sstream>
+
 #include "common/app/log.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/config/config_error.hpp"
+#include "common/text/edit_distance.hpp"
 
 namespace sls::app {
+namespace {
+
+constexpr std::size_t kColumns = 80;
+
+/// `a, b or c`.
+std::string list_choices(std::vector<std::string> names) {
+  if (names.empty()) return "";
+  std::string text = names.back();
+  names.pop_back();
+  if (!names.empty()) text = CLI::detail::join(names, ", ") + " or " + text;
+  return text;
+}
+
+std::string suggest(const std::string& word, const std::vector<std::string>& known) {
+  const auto similar = text::find_similar(word, known);
+  return similar ? "; did you mean '" + *similar + "'?" : "";
+}
+
+/// An argument that fits no option, subcommand or positional argument.
+std::string describe_extra(const std::string& word, const CLI::App& cli) {
+  const CLI::App* used = &cli;
+  while (!used->get_subcommands().empty()) used = used->get_subcommands().back();
+  if (word.rfind('-', 0) == 0) {
+    std::vector<std::string> known;
+    for (const CLI::Option* option : used->get_options())
+      for (const std::string& name : option->get_lnames()) known.push_back("--" + name);
+    return "unknown option '" + word + "'" + suggest(word, known);
+  }
+  std::vector<std::string> names;
+  for (const CLI::App* command : used->get_subcommands([](const CLI::App*) { return true; }))
+    names.push_back(command->get_name());
+  if (names.empty()) return "expected no further argument, got '" + word + "'";
+  return "expected " + list_choices(names) + ", got '" + word + "'" + suggest(word, names);
+}
+
+/// CLI11's error as `PLACE: expected X, got 'Y'`. `words` are the arguments of the program.
+std::string describe_usage_error(const CLI::ParseError& error, const CLI::App& cli,
+                                 const std::vector<std::string>& words) {
+  std::string text = error.what();
+  std::smatch found;
+  const auto matches = [&](const char* pattern) {
+    return std::regex_match(text, found, std::regex(pattern));
+  };
+  if (matches("The following arguments? w(?:as|ere) not expected: (.*)")) {
+    const std::vector<std::string> extras = CLI::detail::split(found[1], ' ');
+    // The first of several as the user typed them; one with spaces is not among the words.
+    const auto first = std::find_first_of(words.begin(), words.end(), extras.begin(), extras.end());
+    return describe_extra(first == words.end() ? found[1].str() : *first, cli);
+  }
+  if (matches("Could not convert: (\\S+) = (.*)")) {
+    text = found[1].str() + ": expected a number, got '" + found[2].str() + "'";
+  } else if (matches("(\\S+): (.*) not in \\{(.*)\\}")) {
+    text = found[1].str() + ": expected " + list_choices(CLI::detail::split(found[3], ',')) +
+           ", got '" + found[2].str() + "'";
+  } else if (matches("(\\S+): Value (.*) not in range \\[?(\\S+) (?:to|-) ([^\\s\\]]+)\\]?")) {
+    text = found[1].str() + ": expected " + found[3].str() + " to " + found[4].str() + ", got '" +
+           found[2].str() + "'";
+  } else if (matches("(\\S+): \\d+ required .* missing")) {
+    text = found[1].str() + ": expected a value";
+  }
+  // A variable of the environment in the place of an option.
+  const std::string domain = "--domain: ";
+  const bool is_given = std::any_of(words.begin(), words.end(), [](const std::string& word) {
+    return word.rfind("--domain", 0) == 0;
+  });
+  if (!is_given && text.rfind(domain + "expected", 0) == 0)
+    return "SLS_DOMAIN: " + text.substr(domain.size());
+  return text;
+}
+
+/// CLI11's help text with lines of at most 80 columns where words allow.
+std::string fit(const std::string& help) {
+  std::istringstream lines(help);
+  std::string text;
+  for (std::string line; std::getline(lines, line); text += line + "\n") {
+    // An option and its meaning are apart by two spaces at least.
+    const std::size_t start = std::min(line.find_first_not_of(' '), line.size());
+    const std::size_t gap = std::min(line.find("  ", start), line.size());
+    const std::size_t meaning = line.find_first_not_of(' ', gap);
+    const std::string margin(meaning == line.npos ? start : meaning, ' ');
+    while (line.size() > kColumns) {
+      const std::size_t end = line.rfind(' ', kColumns);
+      if (end == line.npos || end <= margin.size()) break;
+      text += line.substr(0, line.find_last_not_of(' ', end) + 1) + "\n";
+      line = margin + line.substr(end + 1);
+    }
+  }
+  return text;
+}
+
+}  // namespace
 
 int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
              const std::string& program, const std::function<void()>& work) {

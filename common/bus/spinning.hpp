@@ -2,7 +2,10 @@
 /// time.
 #pragma once
 
+#include <sched.h>
 #include <atomic>
+#include <cstdlib>
+#include <string_view>
 
 namespace sls::bus {
 
@@ -13,7 +16,12 @@ inline std::atomic<bool> is_spinning{false};
 /// For programs whose next message usually comes at once: the server and the controllers in
 /// lockstep. Does not start if the process may use only one processor, because polling would keep
 /// it from the sender, or if the environment has SLS_SPIN=off.
-void start_spinning();
-void stop_spinning();
+inline void start_spinning() {
+  cpu_set_t allowed;
+  const char* value = std::getenv("SLS_SPIN");
+  is_spinning = sched_getaffinity(0, sizeof(allowed), &allowed) == 0 && CPU_COUNT(&allowed) > 1 &&
+                !(value && std::string_view(value) == "off");
+}
+inline void stop_spinning() { is_spinning = false; }
 
 }  // namespace sls::bus

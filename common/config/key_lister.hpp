@@ -265,6 +265,8 @@ std::vector<ListedKey> list_keys_of(const Models& models) {
 }
 
 /// Every key of a scenario, in the order of scenario_keys.hpp.
-std::vector<ListedKey> list_scenario_keys(const Models& models = all_models());
+inline std::vector<ListedKey> list_scenario_keys(const Models& models = all_models()) {
+  return list_keys_of<Scenario>(models);
+}
 
 }  // namespace sls::config

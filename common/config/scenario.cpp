@@ -10,7 +10,7 @@
 #include "common/config/numbers.hpp"
 #include "common/config/scenario_reader.hpp"
 #include "common/config/scenario_writer.hpp"
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 
 namespace sls::config {
 namespace {
@@ -335,7 +335,7 @@ Scenario read_scenario(const YamlNode& root, const std::string& place, const std
   check_conditions(scenario, places);
   find_model_keys(places.models().laws, scenario.controller.law).check(scenario, places);
   scenario.text = text;
-  scenario.sha256 = calc_sha256(text);
+  scenario.sha256 = text::calc_sha256(text);
   return scenario;
 }
 

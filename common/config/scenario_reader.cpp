@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "common/config/edit_distance.hpp"
 #include "common/config/numbers.hpp"
+#include "common/text/edit_distance.hpp"
 
 namespace sls::config {
 namespace {
@@ -156,7 +156,7 @@ void check_keys(const Value& value, const KeyNames& names) {
     if (!is_new) fail("duplicate key; it is already on line " + std::to_string(first->second));
     if (std::find(known.begin(), known.end(), key.text) != known.end()) continue;
     if (const auto owner = names.find_owner(key.text)) fail(*owner);
-    if (const auto similar = find_similar(key.text, known))
+    if (const auto similar = text::find_similar(key.text, known))
       fail("unknown key; did you mean '" + *similar + "'?");
     fail("unknown key; expected one of " + join(known));
   }
@@ -248,7 +248,7 @@ void read_value(const Value& value, ModelName& model, const std::vector<std::str
   const ModelName named{name, value.places.describe(value.line)};
   const bool is_known = std::find(known.begin(), known.end(), name) != known.end();
   if (!is_text || !(is_known || named.is_shared_library())) {
-    const auto similar = is_text ? find_similar(name, known) : std::nullopt;
+    const auto similar = is_text ? text::find_similar(name, known) : std::nullopt;
     value.fail("expected " + expectation + ", got " + to_brief(value.node) +
                (similar ? "; did you mean '" + *similar + "'?" : ""));
   }

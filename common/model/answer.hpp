@@ -28,7 +28,21 @@ enum class ErrorCode : std::uint32_t {
 
 /// For logs and files: "none", "free_fall", "rod_level", "not_finite", "stage_timeout"; "unknown"
 /// for any other number.
-const char* to_string(ErrorCode error_code);
+inline const char* to_string(ErrorCode error_code) {
+  switch (error_code) {
+    case ErrorCode::kNone:
+      return "none";
+    case ErrorCode::kFreeFall:
+      return "free_fall";
+    case ErrorCode::kRodLevel:
+      return "rod_level";
+    case ErrorCode::kNotFinite:
+      return "not_finite";
+    case ErrorCode::kStageTimeout:
+      return "stage_timeout";
+  }
+  return "unknown";
+}
 
 /// The memory of a controller. It travels in the command and comes back in the next state, so any
 /// client can answer any sample. A run starts with the default, which means zeros.

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include "common/model/math.hpp"
 #include "common/model/parameters.hpp"
 
 namespace sls::model {
@@ -10,8 +11,13 @@ namespace sls::model {
 /// Linear rotor drag on the quadrotor, N: −D Π (v − v_wind), Π projecting onto the plane normal to
 /// the control force `f_Q_W`. Zero without a control force, because Π requires its direction.
 /// Eq. (7).
-Eigen::Vector3d calc_rotor_drag(const Eigen::Vector3d& f_Q_W, const Eigen::Vector3d& v_WQ,
-                                const Aerodynamics& air);
+inline Eigen::Vector3d calc_rotor_drag(const Eigen::Vector3d& f_Q_W, const Eigen::Vector3d& v_WQ,
+                                       const Aerodynamics& air) {
+  if (air.rotor_drag == 0.0 || f_Q_W.isZero(0.0)) return Eigen::Vector3d::Zero();
+  const Eigen::Vector3d direction = f_Q_W.stableNormalized();
+  const Eigen::Vector3d v_rel = v_WQ - air.v_wind_W;
+  return -air.rotor_drag * (v_rel - direction * direction.dot(v_rel));
+}
 
 /// Attitude a multirotor must take so that its thrust along −z of the body is `f_Q_W`.
 struct CommandedAttitude {
@@ -21,6 +27,13 @@ struct CommandedAttitude {
 };
 
 /// F = −|F| R(roll, pitch, 0) e₃. Level for a zero force. Eq. (8).
-CommandedAttitude calc_commanded_attitude(const Eigen::Vector3d& f_Q_W);
+inline CommandedAttitude calc_commanded_attitude(const Eigen::Vector3d& f_Q_W) {
+  CommandedAttitude attitude;
+  if (f_Q_W.isZero(0.0)) return attitude;
+  // asin(F_y / |F|) without the square of a tiny or huge force.
+  attitude.roll = math::atan2(f_Q_W.y(), math::hypot(f_Q_W.x(), f_Q_W.z()));
+  attitude.pitch = math::atan2(-f_Q_W.x(), -f_Q_W.z());
+  return attitude;
+}
 
 }  // namespace sls::model

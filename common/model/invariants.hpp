@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 
 #include "common/model/parameters.hpp"
 #include "common/model/state.hpp"
@@ -9,15 +10,26 @@
 namespace sls::model {
 
 /// Kinetic plus potential energy, J; height is −z, zero at z = 0. For point masses.
-double calc_energy(const SlungLoadState& state, const SlungLoadParameters& parameters);
+inline double calc_energy(const SlungLoadState& state, const SlungLoadParameters& parameters) {
+  const double m = parameters.quad_mass, m_L = parameters.load_mass;
+  return 0.5 * m * state.v_WQ.squaredNorm() + 0.5 * m_L * state.v_WL.squaredNorm() -
+         parameters.gravity * (m * state.p_WQ.z() + m_L * state.p_WL.z());
+}
 
 /// m v_WQ + m_L v_WL, kg·m/s.
-Eigen::Vector3d calc_momentum(const SlungLoadState& state, const SlungLoadParameters& parameters);
+inline Eigen::Vector3d calc_momentum(const SlungLoadState& state,
+                                     const SlungLoadParameters& parameters) {
+  return parameters.quad_mass * state.v_WQ + parameters.load_mass * state.v_WL;
+}
 
 /// | |p_WL − p_WQ| − L |, m.
-double calc_rod_length_error(const SlungLoadState& state, double rod_length);
+inline double calc_rod_length_error(const SlungLoadState& state, double rod_length) {
+  return std::abs((state.p_WL - state.p_WQ).norm() - rod_length);
+}
 
 /// |(v_WL − v_WQ) · n_W|, m/s: the speed at which the rod would be stretched.
-double calc_rod_stretch_rate(const SlungLoadState& state);
+inline double calc_rod_stretch_rate(const SlungLoadState& state) {
+  return std::abs((state.v_WL - state.v_WQ).dot((state.p_WL - state.p_WQ).normalized()));
+}
 
 }  // namespace sls::model

@@ -11,22 +11,14 @@ function(sls_add_models kind)
   add_library(sls_${kind}s STATIC ${MODELS_SOURCES})
   add_library(sls::${kind}s ALIAS sls_${kind}s)
   target_link_libraries(sls_${kind}s PUBLIC sls::config sls::model sls::${kind}_keys)
-
-  string(TOUPPER ${kind} macro)
-  file(STRINGS ${kind}s.def models REGEX "^SLS_${macro}\\(")
-  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${kind}s.def)
-  foreach(model IN LISTS models)
-    string(REGEX REPLACE "^SLS_${macro}\\((.*)\\)$" "\\1" model ${model})
-    add_subdirectory(${model})
-  endforeach()
 endfunction()
 
-# sls_add_model(KIND KEYS … SOURCES … [LIBRARIES …]): call it in the folder of one model. KIND is plant,
-# autopilot or law.
-function(sls_add_model kind)
+# sls_add_model(KIND MODEL KEYS … SOURCES … [LIBRARIES …]): there, for each model; the sources are in the folder MODEL.
+# KIND is plant, autopilot or law.
+function(sls_add_model kind model)
   cmake_parse_arguments(MODEL "" "" "KEYS;SOURCES;LIBRARIES" ${ARGN})
-  list(TRANSFORM MODEL_KEYS PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
-  list(TRANSFORM MODEL_SOURCES PREPEND ${CMAKE_CURRENT_SOURCE_DIR}/)
+  list(TRANSFORM MODEL_KEYS PREPEND ${model}/)
+  list(TRANSFORM MODEL_SOURCES PREPEND ${model}/)
   target_sources(sls_${kind}_keys PRIVATE ${MODEL_KEYS})
   target_sources(sls_${kind}s PRIVATE ${MODEL_SOURCES})
   target_link_libraries(sls_${kind}s PRIVATE ${MODEL_LIBRARIES})

@@ -13,7 +13,7 @@
 #endif
 
 #include "common/config/config_error.hpp"
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 
 namespace sls::plugin {
 namespace {
@@ -123,9 +123,9 @@ SharedLibrary::SharedLibrary(const std::filesystem::path& file, const std::strin
   if (!std::filesystem::is_regular_file(file, ignored))
     fail("expected a shared library, got no file of this name");
   try {
-    const std::string sha256 = config::calc_file_sha256(path);
+    const std::string sha256 = text::calc_file_sha256(path);
     load(path);
-    if (config::calc_file_sha256(path) != sha256) {
+    if (text::calc_file_sha256(path) != sha256) {
       ::dlclose(handle_);
       fail("expected a file that does not change while it is loaded");
     }

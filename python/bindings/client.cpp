@@ -23,7 +23,6 @@
 #include "common/config/model_keys.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "python/bindings/bindings.hpp"
-#include "python/bindings/errors.hpp"
 #include "python/bindings/python_law.hpp"
 
 namespace sls::python {

@@ -11,7 +11,6 @@
 #include "common/app/run_main.hpp"
 #include "common/config/scenario.hpp"
 #include "python/bindings/bindings.hpp"
-#include "python/bindings/errors.hpp"
 #include "python/bindings/flight_table.hpp"
 #include "python/bindings/python_law.hpp"
 #include "sim_server/plants/plant.hpp"

@@ -1,5 +1,4 @@
 #include "python/bindings/bindings.hpp"
-#include "python/bindings/errors.hpp"
 #include "python/bindings/python_law.hpp"
 
 PYBIND11_MODULE(_sls_core, module) {

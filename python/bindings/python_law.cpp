@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "common/config/config_error.hpp"
-#include "python/bindings/errors.hpp"
+#include "python/bindings/bindings.hpp"
 
 namespace sls::python {
 namespace {

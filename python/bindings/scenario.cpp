@@ -10,7 +10,6 @@
 #include "common/config/scenario.hpp"
 #include "common/config/scenario_draft.hpp"
 #include "python/bindings/bindings.hpp"
-#include "python/bindings/errors.hpp"
 
 namespace sls::python {
 namespace {

@@ -12,7 +12,7 @@
 #include "closed_loop/delay_margin.hpp"
 #include "closed_loop/flight_recorder.hpp"
 #include "common/config/scenario_draft.hpp"
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 #include "recorder/manifest.hpp"
 #include "tests/closed_loop/support.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -465,7 +465,7 @@ TEST(LibraryOfFlightTest, TheManifestHasTheHashOfTheLaw) {
   const TemporaryFolder folder;
   fly_recorded(scenario, {}, folder / "recording", false);
   const std::string manifest = sls::test::read_bytes(folder / "recording/manifest.json");
-  EXPECT_NE(manifest.find("\"control_client\": \"" + config::calc_file_sha256(law) + "\""),
+  EXPECT_NE(manifest.find("\"control_client\": \"" + text::calc_file_sha256(law) + "\""),
             manifest.npos)
       << manifest;
 }

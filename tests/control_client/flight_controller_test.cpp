@@ -8,10 +8,10 @@
 #include <random>
 
 #include "common/model/forces.hpp"
+#include "control_client/around_law.hpp"
 #include "control_client/laws/error_integral.hpp"
 #include "control_client/laws/qsf/lqr.hpp"
 #include "control_client/laws/qsf/qsf_law.hpp"
-#include "control_client/state_wiring.hpp"
 #include "tests/control_client/sample_scenarios.hpp"
 
 namespace sls::control {

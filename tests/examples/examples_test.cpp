@@ -3,7 +3,7 @@
 
 #include <cstdio>
 
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 #include "tests/system/flight.hpp"
 
 namespace sls::test {
@@ -93,9 +93,8 @@ TEST(ExamplesTest, AreInstalledBuiltAndFlownAsByAUser) {
   expect_refused(installation, "my_plant", "stiffness_n_m", "plant", 6,
                  "stiffness_n_m or damping_n_s_m");
   const fs::path turned = expect_same_flight(installation, "my_autopilot");
-  EXPECT_EQ(
-      read_manifest(turned).at("libraries").at("plant").get<std::string>(),
-      config::calc_file_sha256(installation.example("my_autopilot") / "build/my_autopilot.so"));
+  EXPECT_EQ(read_manifest(turned).at("libraries").at("plant").get<std::string>(),
+            text::calc_file_sha256(installation.example("my_autopilot") / "build/my_autopilot.so"));
   expect_refused(installation, "my_autopilot", "attitude_1_s2", "autopilot", 18,
                  "attitude_1_s2 or rate_1_s");
   // 6 s after the reference returned to (0, 0, −1) m.

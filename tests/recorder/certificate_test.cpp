@@ -7,7 +7,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 #include "tests/recorder/csv_table.hpp"
 #include "tests/recorder/flights.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -71,9 +71,9 @@ std::string calc_certificate(const fs::path& folder) {
     std::string bytes;
     for (const auto& step : steps)
       for (const auto& row : step.second) bytes += row.second;
-    all += little_endian(id, 4) + from_hex(config::calc_sha256(bytes));
+    all += little_endian(id, 4) + from_hex(text::calc_sha256(bytes));
   }
-  return config::calc_sha256(all);
+  return text::calc_sha256(all);
 }
 
 std::string read_certificate(const fs::path& folder) {

@@ -7,7 +7,7 @@
 #include <thread>
 
 #include "common/app/run_main.hpp"
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 #include "recorder/verification.hpp"
 #include "tests/recorder/flights.hpp"
 #include "tests/support/own_domain.hpp"

@@ -11,7 +11,7 @@
 #include <set>
 
 #include "common/bus/convert.hpp"
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 #include "tests/recorder/csv_table.hpp"
 #include "tests/recorder/file_size_limit.hpp"
 #include "tests/recorder/flights.hpp"
@@ -212,7 +212,7 @@ TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
   const Json manifest = read_manifest();
   EXPECT_EQ(manifest.at("run_id"), "0123456789abcdef");
   EXPECT_EQ(manifest.at("scenario"), "synthetic");
-  EXPECT_EQ(manifest.at("scenario_sha256"), config::calc_sha256(kScenarioText));
+  EXPECT_EQ(manifest.at("scenario_sha256"), text::calc_sha256(kScenarioText));
   EXPECT_EQ(manifest.at("vehicle_ids"), Json::array({0}));
   EXPECT_EQ(manifest.at("period_s"), 0.004);
   EXPECT_EQ(manifest.at("step_s"), 0.001);
@@ -236,8 +236,8 @@ TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
     there.insert(entry.path().filename());
   for (const auto& [name, file] : manifest.at("files").items()) {
     listed.insert(name);
-    EXPECT_EQ(file.at("sha256"), config::calc_file_sha256(folder_ / name)) << name;
-    EXPECT_EQ(file.at("sha256"), config::calc_sha256(read_bytes(folder_ / name))) << name;
+    EXPECT_EQ(file.at("sha256"), text::calc_file_sha256(folder_ / name)) << name;
+    EXPECT_EQ(file.at("sha256"), text::calc_sha256(read_bytes(folder_ / name))) << name;
     if (name.find(".csv") != std::string::npos)
       EXPECT_EQ(file.at("rows"), read_table(name).rows.size()) << name;
     else
@@ -265,7 +265,7 @@ TEST(RecordingLibraryTest, LibrariesAreInTheManifest) {
 
 TEST_F(RecordingTest, TheScenarioIsKeptByteForByte) {
   EXPECT_EQ(read_bytes(folder_ / "scenario.yaml"), kScenarioText);
-  EXPECT_EQ(config::calc_file_sha256(folder_ / "scenario.yaml"),
+  EXPECT_EQ(text::calc_file_sha256(folder_ / "scenario.yaml"),
             make_parameters().scenario_sha256().to_string());
 }
 

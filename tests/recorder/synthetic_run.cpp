@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "common/bus/convert.hpp"
-#include "common/config/sha256.hpp"
 #include "common/model/state.hpp"
+#include "common/text/sha256.hpp"
 
 namespace sls::record::test {
 namespace {
@@ -68,7 +68,7 @@ Parameters make_parameters() {
   message.run_id(kRunId);
   set_vehicles(message, {0});
   message.scenario_text(kScenarioText);
-  message.scenario_sha256(config::calc_sha256(kScenarioText));
+  message.scenario_sha256(text::calc_sha256(kScenarioText));
   message.contract_sha256(bus::kContractSha256);
   message.period_ns(kPeriod);
   message.step_ns(1'000'000);

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "common/config/sha256.hpp"
 #include "common/plugin/shared_library.hpp"
+#include "common/text/sha256.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::sim {
@@ -27,7 +27,7 @@ TEST(MessagesTest, TheLibraryIsTheLoadedOneWhenAnotherHasTakenTheFilesPlace) {
   scenario.folder = folder.path();
   scenario.plant.model.name = "mine.so";
   std::filesystem::copy(SLS_LIBRARIES "/empty.so", folder / "mine.so");
-  const std::string flown = config::calc_file_sha256(folder / "mine.so");
+  const std::string flown = text::calc_file_sha256(folder / "mine.so");
   const plugin::SharedLibrary library(folder / "mine.so", "plant.model");
   for (int reset = 0; reset < 2; ++reset) {
     EXPECT_EQ(make_parameters_message(31, {0}, scenario, TurningPlant(), "sls 9.9")

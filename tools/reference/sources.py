@@ -241,7 +241,7 @@ def load_faults():
     enums = load_contract()[1]
     header = re.search(r"enum class ErrorCode[^{]*\{(.*?)\};", read("common/model/answer.hpp"), re.DOTALL)[1]
     meanings = re.findall(r"(k\w+),(?:\s*///< (.*))?", header)
-    texts = dict(re.findall(r'case ErrorCode::(k\w+):\s*return "(\w+)";', read("common/model/answer.cpp")))
+    texts = dict(re.findall(r'case ErrorCode::(k\w+):\s*return "(\w+)";', read("common/model/answer.hpp")))
     wire = [value for value, _ in enums["FaultCode"]]
     if len(wire) != len(meanings):
         raise StaleReference("idl/sls.idl and common/model/answer.hpp have different numbers of error codes")

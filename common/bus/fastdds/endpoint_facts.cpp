@@ -8,8 +8,8 @@
 #include <iterator>
 
 #include "common/bus/topics.hpp"
-#include "common/config/edit_distance.hpp"
 #include "common/config/yaml_node.hpp"
+#include "common/text/edit_distance.hpp"
 
 namespace sls::bus {
 namespace {
@@ -159,7 +159,7 @@ std::optional<std::string> find_meant_topic(const EndpointFacts& endpoint) {
   std::optional<std::string> meant;
   std::size_t least = kMostEdits + 1;
   for (const char* name : known) {
-    const std::size_t edits = config::calc_edit_distance(simple, simplify(name));
+    const std::size_t edits = text::calc_edit_distance(simple, simplify(name));
     if (edits >= least) continue;
     least = edits;
     meant = name;

@@ -41,7 +41,6 @@
 #include <utility>
 
 #include "common/bus/fastdds/adaptive_spin.hpp"
-#include "common/bus/fastdds/leaving.hpp"
 #include "common/bus/fastdds/shared_locks.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/spinning.hpp"

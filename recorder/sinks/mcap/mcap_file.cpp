@@ -1,5 +1,6 @@
 #include "recorder/sinks/mcap/mcap_file.hpp"
 
+#include <zlib.h>
 #include <zstd.h>
 
 #include <algorithm>
@@ -34,6 +35,12 @@ enum Opcode : std::uint8_t {
 };
 
 constexpr std::size_t kOpcodeBytes = 1, kLengthBytes = 8;
+
+/// CRC of `bytes` that follow those with the CRC `before`.
+std::uint32_t calc_crc32(std::string_view bytes, std::uint32_t before = 0) {
+  const auto* const data = reinterpret_cast<const Bytef*>(bytes.data());
+  return static_cast<std::uint32_t>(crc32_z(before, data, bytes.size()));
+}
 
 }  // namespace
 
@@ -88,7 +95,7 @@ void McapFile::end_record() {
 void McapFile::flush() {
   const std::string_view bytes = out_.bytes();
   file_.append(bytes, [](std::size_t) { return std::size_t{0}; });
-  crc_.add(bytes);
+  crc_ = calc_crc32(bytes, crc_);
   written_ += bytes.size();
   out_.clear();
 }
@@ -218,7 +225,7 @@ void McapFile::finish() {
   write_chunk();
   flush();
   begin_record(kDataEnd);
-  out_.append(crc_.value());
+  out_.append(crc_);
   end_record();
   flush();
   write_summary();

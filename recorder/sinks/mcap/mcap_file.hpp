@@ -13,7 +13,6 @@
 
 #include "recorder/byte_buffer.hpp"
 #include "recorder/sinks/growing_file.hpp"
-#include "recorder/sinks/mcap/crc32.hpp"
 
 namespace sls::record {
 
@@ -84,7 +83,7 @@ class McapFile {
 
   GrowingFile file_;
   std::uint64_t written_ = 0;  // bytes in the file
-  Crc32 crc_;                  // of these bytes
+  std::uint32_t crc_ = 0;      // of these bytes
   ByteBuffer out_;             // records that are not written yet
   std::size_t record_ = 0;     // begin of the current record in out_
   struct Compressor;

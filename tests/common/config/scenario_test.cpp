@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 #include "tests/common/config/support.hpp"
 #include "tests/support/temporary_folder.hpp"
 

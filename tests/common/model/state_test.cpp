@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "common/model/rotation.hpp"
 #include "tests/support/random_vectors.hpp"
 
 namespace sls::model {
@@ -220,6 +221,16 @@ TEST(StateTest, EveryNumberOfAStateIsLookedAtForBeingFinite) {
       EXPECT_FALSE(is_finite(state));
     }
   }
+}
+
+TEST(RotationTest, ATurnIsThatOfEigen) {
+  for (double angle = -7.0; angle < 7.0; angle += 0.1)
+    for (const Vector3d& axis :
+         {Vector3d(Vector3d::UnitX()), Vector3d(Vector3d::UnitZ()), Vector3d(0.6, 0.0, -0.8)}) {
+      const Eigen::Quaterniond expected(Eigen::AngleAxisd(angle, axis));
+      // Both round a sine or cosine and a product.
+      EXPECT_LT((make_turn(angle, axis).coeffs() - expected.coeffs()).norm(), 1e-15) << angle;
+    }
 }
 
 }  // namespace

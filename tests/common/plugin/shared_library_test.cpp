@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "common/config/config_error.hpp"
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 #include "tests/common/plugin/misbehaviour.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -132,7 +132,7 @@ TEST(SharedLibraryTest, TheHashIsThatOfTheLoadedFileWhenAnotherTakesItsPlace) {
   EXPECT_EQ(find_loaded_sha256(file), "");
   EXPECT_EQ(find_loaded_sha256({}), "");
   const SharedLibrary loaded(file, "place");
-  const std::string sha256 = config::calc_file_sha256(kFolder + "empty.so");
+  const std::string sha256 = text::calc_file_sha256(kFolder + "empty.so");
   EXPECT_EQ(find_loaded_sha256(file), sha256);
 
   std::filesystem::copy(kFolder + "other.so", next);

@@ -23,7 +23,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoNumber = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// One case: a plant and its controller, which has the exact parameters of the plant.
@@ -466,7 +466,7 @@ TEST(QsfLawTest, AHugeForceIsTheServersToJudge) {
 TEST(QsfLawTest, ReportsInputAndForceThatAreNotFinite) {
   Case one;
   one.gains = make_named_gains(LqrWeights{});
-  for (const double bad : {kNan, kInfinity, -kInfinity}) {
+  for (const double bad : {kNoNumber, kInfinity, -kInfinity}) {
     Case broken = one;
     broken.state.v_WQ.y() = bad;
     expect_error_code(broken, ErrorCode::kNotFinite);
@@ -483,7 +483,7 @@ TEST(QsfLawTest, NeverGivesANumberThatIsNotFinite) {
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   const auto draw = [&]() {
     const double kind = unit(generator), sign = unit(generator) < 0.5 ? -1.0 : 1.0;
-    if (kind < 0.02) return kNan;
+    if (kind < 0.02) return kNoNumber;
     if (kind < 0.04) return sign * kInfinity;
     if (kind < 0.3) return sign * std::pow(10.0, -320.0 + 628.0 * unit(generator));
     return sign * 4.0 * unit(generator);
@@ -508,6 +508,28 @@ TEST(QsfLawTest, NeverGivesANumberThatIsNotFinite) {
       ASSERT_EQ(output.f_Q_W, Vector3d::Zero());
     }
   }
+}
+
+TEST(ErrorIntegralTest, AdvancesByForwardEuler) {
+  EXPECT_EQ(calc_next_integral({1.0, -2.0, 0.0}, {0.5, 0.25, -4.0}, 0.25),
+            Eigen::Vector3d(1.125, -1.9375, -1.0));
+}
+
+TEST(ErrorIntegralTest, StopsAtTheLimitOfEachAxisAndComesBack) {
+  Eigen::Vector3d integral(19.9, -19.9, 0.0);
+  for (int i = 0; i < 100; ++i) integral = calc_next_integral(integral, {1.0, -1.0, 0.5}, 0.25);
+  EXPECT_EQ(integral, Eigen::Vector3d(20.0, -20.0, 12.5));
+  EXPECT_EQ(calc_next_integral(integral, {-1.0, 1.0, 0.0}, 0.25),
+            Eigen::Vector3d(19.75, -19.75, 12.5));
+}
+
+TEST(ErrorIntegralTest, IsClampedOnlyAtTheLimitAndPushedOutwards) {
+  EXPECT_TRUE(is_clamped(20.0, 0.1));
+  EXPECT_TRUE(is_clamped(-20.0, -0.1));
+  EXPECT_FALSE(is_clamped(20.0, -0.1));
+  EXPECT_FALSE(is_clamped(-20.0, 0.1));
+  EXPECT_FALSE(is_clamped(19.999, 0.1));
+  EXPECT_FALSE(is_clamped(20.0, 0.0));
 }
 
 }  // namespace

@@ -17,7 +17,7 @@
 #include <system_error>
 
 #include "common/config/config_error.hpp"
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 #include "tools/view/web/request_text.hpp"
 
 namespace sls::view {
@@ -241,8 +241,8 @@ Access judge(const RequestOrigin& request, const AccessOptions& options) {
 bool is_same_token(std::string_view given, std::string_view expected) {
   // Digests have one length, and the place of their first difference gives no information about the
   // tokens.
-  config::Sha256 given_hash;
-  config::Sha256 expected_hash;
+  text::Sha256 given_hash;
+  text::Sha256 expected_hash;
   given_hash.add(given);
   expected_hash.add(expected);
   const auto a = given_hash.finish();

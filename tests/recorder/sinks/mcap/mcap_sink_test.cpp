@@ -7,8 +7,7 @@
 #include <system_error>
 
 #include "common/config/config_error.hpp"
-#include "common/config/sha256.hpp"
-#include "recorder/sinks/mcap/crc32.hpp"
+#include "common/text/sha256.hpp"
 #include "recorder/sinks/mcap/mcap_file.hpp"
 #include "recorder/verification.hpp"
 #include "tests/recorder/file_size_limit.hpp"
@@ -30,7 +29,7 @@ using sls::test::write_bytes;
 Parameters ask_for_mcap(Parameters parameters) {
   const std::string text = kScenarioText + std::string("record: { format: [csv, mcap] }\n");
   parameters.scenario_text(text);
-  parameters.scenario_sha256(config::calc_sha256(text));
+  parameters.scenario_sha256(text::calc_sha256(text));
   return parameters;
 }
 
@@ -61,14 +60,6 @@ class McapSinkTest : public testing::Test {
   const fs::path out_ = folder_ / "out", other_ = folder_ / "other";
   const fs::path converted_ = folder_ / "converted.mcap";
 };
-
-TEST(Crc32Test, IsThatOfThePublishedCheckValueHoweverTheBytesCome) {
-  EXPECT_EQ(calc_crc32("123456789"), 0xcbf43926u);  // check value of CRC-32/ISO-HDLC
-  EXPECT_EQ(calc_crc32(""), 0u);
-  Crc32 crc;
-  for (const char* piece : {"1", "2345678", "", "9"}) crc.add(piece);
-  EXPECT_EQ(crc.value(), 0xcbf43926u);
-}
 
 TEST_F(McapSinkTest, ScenariosThatDoNotAskForItHaveNoSuchFile) {
   record_flight(out_);
@@ -140,7 +131,7 @@ TEST_F(McapSinkTest, TheManifestListsTheFileAndItsCompressorAndVerifyChecksIt) {
   record_flight(out_, {}, ask_for_mcap(make_parameters()));
   const auto manifest = nlohmann::json::parse(read_bytes(out_ / "manifest.json"));
   EXPECT_EQ(manifest.at("files").at("sls.mcap").at("sha256"),
-            config::calc_file_sha256(out_ / "sls.mcap"));
+            text::calc_file_sha256(out_ / "sls.mcap"));
   EXPECT_FALSE(manifest.at("files").at("sls.mcap").contains("rows"));
   EXPECT_EQ(manifest.at("versions").at("zstd"), describe_compression().version);
   EXPECT_TRUE(inspect(open_recording(out_)).problems.empty());

@@ -1,4 +1,4 @@
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 
 #include <openssl/evp.h>
 
@@ -7,7 +7,7 @@
 #include <stdexcept>
 #include <system_error>
 
-namespace sls::config {
+namespace sls::text {
 
 Sha256::Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
   if (!context_ || EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) != 1)
@@ -54,4 +54,4 @@ std::string calc_file_sha256(const std::filesystem::path& file) {
   return to_hex(hash.finish());
 }
 
-}  // namespace sls::config
+}  // namespace sls::text

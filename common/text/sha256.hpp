@@ -9,7 +9,7 @@
 
 struct evp_md_ctx_st;  // OpenSSL's
 
-namespace sls::config {
+namespace sls::text {
 
 /// Calculates a SHA-256 of data that comes in pieces.
 class Sha256 {
@@ -37,4 +37,4 @@ std::string calc_sha256(std::string_view bytes);
 /// @throws std::system_error naming the file where it cannot be read.
 std::string calc_file_sha256(const std::filesystem::path& file);
 
-}  // namespace sls::config
+}  // namespace sls::text

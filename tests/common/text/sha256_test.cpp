@@ -1,11 +1,11 @@
-#include "common/config/sha256.hpp"
+#include "common/text/sha256.hpp"
 
 #include <gtest/gtest.h>
 
 #include "common/config/scenario.hpp"
 #include "tests/common/config/support.hpp"
 
-namespace sls::config {
+namespace sls::text {
 namespace {
 
 // Source: NIST, FIPS 180-2 appendix B and the example values published with it.
@@ -30,9 +30,9 @@ TEST(Sha256Test, PiecesGiveTheHashOfTheWhole) {
 }
 
 TEST(Sha256Test, ScenarioCarriesTheHashOfItsFilesBytes) {
-  for (const auto& file : test::list_yaml_files("config/scenarios")) {
-    const Scenario scenario = load_scenario(file);
-    EXPECT_EQ(scenario.text, test::read_text(file));
+  for (const auto& file : config::test::list_yaml_files("config/scenarios")) {
+    const config::Scenario scenario = config::load_scenario(file);
+    EXPECT_EQ(scenario.text, config::test::read_text(file));
     EXPECT_EQ(scenario.sha256, calc_file_sha256(file));
   }
 }
@@ -47,4 +47,4 @@ TEST(Sha256Test, MissingFileIsNamed) {
 }
 
 }  // namespace
-}  // namespace sls::config
+}  // namespace sls::text

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-namespace sls::config {
+namespace sls::text {
 
 /// Insertions, deletions, replacements and swaps of neighbours that turn `a` into `b`.
 std::size_t calc_edit_distance(const std::string& a, const std::string& b);
@@ -14,4 +14,4 @@ std::size_t calc_edit_distance(const std::string& a, const std::string& b);
 std::optional<std::string> find_similar(const std::string& key,
                                         const std::vector<std::string>& known);
 
-}  // namespace sls::config
+}  // namespace sls::text

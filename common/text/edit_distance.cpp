@@ -1,10 +1,10 @@
-#include "common/config/edit_distance.hpp"
+#include "common/text/edit_distance.hpp"
 
 #include <algorithm>
 #include <numeric>
 #include <vector>
 
-namespace sls::config {
+namespace sls::text {
 
 std::size_t calc_edit_distance(const std::string& a, const std::string& b) {
   std::vector<std::size_t> before_last, last(b.size() + 1), row(b.size() + 1);
@@ -39,4 +39,4 @@ std::optional<std::string> find_similar(const std::string& key,
   return similar;
 }
 
-}  // namespace sls::config
+}  // namespace sls::text

@@ -1,5 +1,0 @@
-#include "tests/common/plugin/misbehaviour.hpp"
-
-namespace {
-const int kNothing = (sls::test::misbehave("crash"), 0);
-}

@@ -1,1 +1,0 @@
-// Empty: only the way it is linked matters.

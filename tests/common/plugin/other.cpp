@@ -1,1 +1,0 @@
-extern "C" void sls_test_is_other() {}
