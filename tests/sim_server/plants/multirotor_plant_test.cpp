@@ -175,11 +175,7 @@ struct Differences {
   double tilt = 0.0;                                 // largest of the flight, in rad
 };
 
-#ifdef SLS_ASAN  // a step takes twenty times as long, and 4 s lean far enough
-constexpr double kFlightTime = 4.0;
-#else
 constexpr double kFlightTime = 16.0;  // s
-#endif
 
 /// Manoeuvres of kFlightTime with a thrust that leans beyond 60° to all sides. The oracle gets the
 /// vehicle's state every `section_s` seconds, otherwise only the set-points of the rotors.
