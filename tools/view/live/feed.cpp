@@ -112,10 +112,6 @@ const char* type_of(TopicId topic) {
   return kNames[static_cast<std::size_t>(topic)];
 }
 
-bool is_latched(TopicId topic) {
-  return topic != TopicId::kState && topic != TopicId::kCommand && topic != TopicId::kRecord;
-}
-
 struct Feed::Impl {
   Impl(bus::Node& bus_node, std::uint32_t vehicle_id, Post post_task)
       : node(bus_node), post(std::move(post_task)), watch(bus_node, vehicle_id, [this] {

@@ -25,7 +25,9 @@ const char* type_of(TopicId topic);  ///< "sls::States"
 
 /// True for the topics whose samples are rare and must reach a late joiner. They are never dropped,
 /// except in a flood.
-bool is_latched(TopicId topic);
+inline bool is_latched(TopicId topic) {
+  return topic != TopicId::kState && topic != TopicId::kCommand && topic != TopicId::kRecord;
+}
 
 /// A sample as received.
 struct Sample {
