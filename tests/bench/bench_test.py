@@ -8,17 +8,17 @@ import resource
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv.pop()).resolve() if __name__ == "__main__" else ROOT / "build"
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "tests/support")]
 
 from bench import instructions, loop  # noqa: E402
 from bench.programs import Programs, wait_for  # noqa: E402
 from bench.results import LESS, Figure, Rounds, format_number, format_table  # noqa: E402
+from folder_test import FolderTest  # noqa: E402
 
 GOOGLE_BENCHMARK = BUILD / "bin/sls_microbench"
 
@@ -44,15 +44,6 @@ def bench(*words, check=0):
     if check is not None and done.returncode != check:
         raise AssertionError(f"ended with {done.returncode}: {done.stdout}{done.stderr}")
     return done
-
-
-class FolderTest(unittest.TestCase):
-    """With an empty folder for each test."""
-
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
 
 
 class BoundTest(unittest.TestCase):

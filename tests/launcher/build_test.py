@@ -3,18 +3,15 @@
 The launcher runs in a small checkout, whose programs print a text of their sources. Stand-ins before the real cmake
 and ninja record how these are called."""
 
-import os
 import pathlib
 import re
 import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 
-import checkout
+from checkout import ROOT, CheckoutTest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
 sys.path.insert(0, str(ROOT / "python"))
 from sls.launcher.building import FLYING  # noqa: E402
@@ -40,33 +37,20 @@ int main(void) { return puts(TEXT) < 0; }
 """
 
 
-class BuildTest(unittest.TestCase):
+class BuildTest(CheckoutTest):
+    parts = ("CMakePresets.json", "config/scenarios")
+
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        self.root = self.folder / "checkout"
-        self.root.mkdir()
-        for name in ("sls", "CMakePresets.json"):
-            shutil.copy(ROOT / name, self.root)
-        for name in ("python/sls/__init__.py", "python/sls/launcher", "config/scenarios"):
-            checkout.copy(name, self.root)
+        super().setUp()
         self.write("CMakeLists.txt", CMAKE)
         self.write("main.c", MAIN)
         self.write("text.h", '#define TEXT "first"\n')
-        self.calls = self.folder / "calls"
-        stand_ins = self.folder / "bin"
-        stand_ins.mkdir()
         for name in ("cmake", "ninja", "make", "dpkg-query", "node", "npm"):
-            action = {"dpkg-query": 'for name; do printf "%s=installed " "$name"; done', "node": "echo v18.0.0",
-                      "npm": "false"}.get(name, f"exec {shutil.which(name)} \"$@\"")
-            (stand_ins / name).write_text(f'#!/bin/sh\necho {name} "$*" >>{self.calls}\n{action}\n')
-            (stand_ins / name).chmod(0o755)
-        self.environment = {name: value for name, value in os.environ.items() if name not in (
-            "SLS_BUILD", "CMAKE_GENERATOR")} | {"PATH": f"{stand_ins}:{os.environ['PATH']}"}
+            self.stand_in(name, {"dpkg-query": 'for name; do printf "%s=installed " "$name"; done', "npm": "false",
+                                 "node": "echo v18.0.0"}.get(name, f"exec {shutil.which(name)} \"$@\""))
 
     def write(self, name, text):
-        (self.root / name).write_text(text)
+        super().write(f"checkout/{name}", text)
 
     def start(self, root=None):
         return subprocess.Popen([(root or self.root) / "sls", "run", "short", "--in-process"], env=self.environment,

@@ -3,14 +3,13 @@
 Packages made of a few files stand in for versions 2.9 and 3.1; nothing of this machine's is found."""
 
 import os
-import pathlib
 import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from checkout import ROOT, FolderTest
+
 PROJECT = """cmake_minimum_required(VERSION 3.25)
 project(small LANGUAGES CXX)
 include(%s/common/bus/fastdds/find.cmake)
@@ -34,18 +33,10 @@ def join(text):
     return " ".join(error.split())
 
 
-class FastDdsTest(unittest.TestCase):
+class FastDdsTest(FolderTest):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+        super().setUp()
         self.write("CMakeLists.txt", PROJECT)
-
-    def write(self, name, text):
-        path = self.folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-        return path
 
     def add(self, prefix, name, version):
         self.write(f"{prefix}/lib/cmake/{name}/{name}-config.cmake", CONFIG.format(name))
@@ -60,7 +51,7 @@ class FastDdsTest(unittest.TestCase):
         self.write(f"{prefix}/include/fastcdr/config.h", f"#define FASTCDR_VERSION_MAJOR {major}\n")
 
     def add_generator(self, version):
-        self.write("fastddsgen", f"#!/bin/sh\necho fastddsgen version {version}\n").chmod(0o755)
+        self.write("fastddsgen", f"#!/bin/sh\necho fastddsgen version {version}\n", 0o755)
 
     def add_2(self, prefix="two"):
         self.add(prefix, "fastrtps", "2.9.1")
@@ -157,7 +148,7 @@ class FastDdsTest(unittest.TestCase):
     def test_a_second_configuration_starts_no_compiler_and_no_generator(self):
         self.add_2()
         self.expect_taken("major 2, target fastrtps")
-        self.write("fastddsgen", "#!/bin/sh\nexit 1\n")
+        self.write("fastddsgen", "#!/bin/sh\nexit 1\n", 0o755)
         (self.folder / "two/include/fastrtps/config.h").unlink()
         self.expect_taken("major 2, target fastrtps")
 

@@ -66,33 +66,24 @@ MISTAKES = {
 }
 
 
-class MistakesTest(unittest.TestCase):
+class MistakesTest(checkout.CheckoutTest):
     maxDiff = None
+    parts = ("config", "docs/reference")
 
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name).resolve()
-        self.root = self.folder / "checkout"
-        for name in ("sls", "python/sls/__init__.py", "python/sls/launcher", "config", "docs/reference"):
-            checkout.copy(name, self.root)
-        (self.folder / "bin").mkdir()
+        super().setUp()
         for name in ("cmake", "ninja", "dpkg-query", "apt-get", "node", "npm"):
-            program = self.folder / "bin" / name
-            program.write_text(f"#!/bin/sh\necho {name} >>{self.folder}/calls\nexit 1\n")
-            program.chmod(0o755)
+            self.stand_in(name, "exit 1")
 
     def launch(self, *words, **variables):
-        environment = {**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}", **variables}
-        environment.pop("SLS_BUILD", None)
-        return subprocess.run([self.root / "sls", *words], cwd=self.folder, env=environment, capture_output=True,
-                              text=True, timeout=60, check=False)
+        return subprocess.run([self.root / "sls", *words], cwd=self.folder, env={**self.environment, **variables},
+                              capture_output=True, text=True, timeout=60, check=False)
 
     def expect_refused(self, line, *words, **variables):
         done = self.launch(*words, **variables)
         self.assertEqual((done.returncode, done.stdout, done.stderr.replace(str(self.root), "ROOT")),
                          (2, "", f"sls: error: {line}\n"))
-        self.assertFalse((self.folder / "calls").exists(), "looked at the build")
+        self.assertFalse(self.calls.exists(), "looked at the build")
 
     def test_each_mistake_is_one_line_before_the_build(self):
         for words, line in MISTAKES.items():
@@ -121,8 +112,8 @@ class MistakesTest(unittest.TestCase):
                       "campaign gains --runs 0-1", "campaign status campaigns/a", "verify a b"):
             with self.subTest(words):
                 self.launch(*words.split())
-                self.assertTrue((self.folder / "calls").exists())
-                (self.folder / "calls").unlink()
+                self.assertTrue(self.calls.exists())
+                self.calls.unlink()
 
     def test_a_prefix_of_an_option_and_words_after_two_dashes_are_left_to_the_program(self):
         check_words("campaign", ["gains", "--work", "2"])

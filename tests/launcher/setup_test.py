@@ -2,16 +2,12 @@
 
 A copy of the launcher reads the test's own os-release. Stand-ins for dpkg-query, apt-get and npm record their calls."""
 
-import os
-import pathlib
 import subprocess
 import sys
-import tempfile
 import unittest
 
-import checkout
+from checkout import CheckoutTest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
 DEBIAN = 'PRETTY_NAME="Debian GNU/Linux {0} ({1})"\nNAME="Debian GNU/Linux"\nVERSION_ID="{0}"\nID=debian\n'
 BOOKWORM, TRIXIE = DEBIAN.format(12, "bookworm"), DEBIAN.format(13, "trixie")
 NOT_TRIED = {
@@ -30,32 +26,20 @@ E: Unable to locate package ninja-build
 """
 
 
-class SetupTest(unittest.TestCase):
+class SetupTest(CheckoutTest):
+    parts = ("config/scenarios",)
+
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-        self.root = self.folder / "checkout"
-        self.root.mkdir()
-        text = (ROOT / "sls").read_text(encoding="utf-8")
-        for name in ("python/sls/__init__.py", "python/sls/launcher", "config/scenarios"):
-            checkout.copy(name, self.root)
+        super().setUp()
+        text = (self.root / "sls").read_text(encoding="utf-8")
         self.release = self.folder / "os-release"
         self.assertIn("/etc/os-release", text)
         (self.root / "sls").write_text(text.replace(" /etc/os-release", f" {self.release}"), encoding="utf-8")
-        (self.root / "sls").chmod(0o755)
-        self.calls = self.folder / "calls"
         self.said = self.folder / "said"
         for name, action in (("dpkg-query", "exit 1"), ("node", "echo v18.0.0"), ("sudo", 'exec "$@"'),
                              ("apt-get", f"test ! -f {self.said} || {{ cat {self.said}; exit 100; }}"),
                              ("npm", f"cat {self.said} >&2; exit 1")):
             self.stand_in(name, action)
-
-    def stand_in(self, name, action):
-        path = self.folder / "bin" / name
-        path.parent.mkdir(exist_ok=True)
-        path.write_text(f'#!/bin/sh\necho {name} "$*" >>{self.calls}\n{action}\n')
-        path.chmod(0o755)
 
     def launch(self, release, *words):
         """Starts the launcher on a system with this os-release; returns code, output and the calls of stand-ins."""
@@ -63,10 +47,8 @@ class SetupTest(unittest.TestCase):
         if release is not None:
             self.release.write_text(release)
         self.calls.write_text("")
-        environment = {**os.environ, "PATH": f"{self.folder}/bin:{os.environ['PATH']}", "TMPDIR": str(self.folder)}
-        environment.pop("SLS_BUILD", None)
-        done = subprocess.run([self.root / "sls", *words], env=environment, cwd=self.folder, capture_output=True,
-                              text=True, timeout=60, check=False)
+        done = subprocess.run([self.root / "sls", *words], env={**self.environment, "TMPDIR": str(self.folder)},
+                              cwd=self.folder, capture_output=True, text=True, timeout=60, check=False)
         return done.returncode, done.stdout + done.stderr, self.calls.read_text()
 
     def test_each_system_gets_its_own_names(self):
@@ -92,8 +74,7 @@ class SetupTest(unittest.TestCase):
                     self.assertNotIn("apt-get", calls)
 
     def test_variables_of_the_caller_are_no_system(self):
-        os.environ |= {"ID": "debian", "VERSION_ID": "12"}
-        self.addCleanup(lambda: [os.environ.pop(name) for name in ("ID", "VERSION_ID")])
+        self.environment |= {"ID": "debian", "VERSION_ID": "12"}
         self.assertEqual(self.launch(None, "setup")[0], 1)
 
     def test_no_install_installs_nothing_on_any_system(self):

@@ -5,11 +5,11 @@ import pathlib
 import signal
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from checkout import ROOT, FolderTest
+
 sys.path.insert(0, str(ROOT / "python"))
 from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor  # noqa: E402
 
@@ -27,12 +27,7 @@ sys.exit(code)
 LIMIT_S = 60
 
 
-class SupervisionTest(unittest.TestCase):
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
+class SupervisionTest(FolderTest):
     def start(self, patience=30.0, overrun=60.0, **programs):
         """Each program writes its process id into NAME.pid when it is ready."""
         scripts = {name: script.replace("READY", f"echo $$ >{self.folder}/{name}.new; "

@@ -71,6 +71,16 @@ class FlightsTest(CampaignTest):
         return sls.fly(sls.load_scenario(self.folder / "base.yaml", changes={
             path: yaml.safe_load(row[path]) for path in paths}))
 
+    def open_out(self):
+        from sls.campaign.folder import CampaignFolder
+        return CampaignFolder(self.folder / "out")
+
+    def change_certificates(self, folder):
+        for number, _, _ in folder.chunks:
+            rows = [[*cells[:-1], "0" * 64] for cells in folder.read_chunk(number)]
+            folder.chunk_file(number).unlink()
+            folder.write_chunk(number, rows)
+
     def test_rows_are_what_the_package_flies(self):
         self.write_campaign()
         self.fly("campaign.yaml", "--out", "one", "--workers", 1)
@@ -153,11 +163,7 @@ class FlightsTest(CampaignTest):
         self.assertEqual({row["f"] for row in self.read_rows("out")}, {"3.0"})
 
     def test_an_own_measure_that_cannot_be_loaded_is_refused_before_anything_flies(self):
-        self.write("own.py", "import nothing_of_this_name\n")
-        self.write_campaign()
-        text = (self.folder / "campaign.yaml").read_text().replace(
-            "time_of_loss]", "{ python: own.py, function: f, columns: [f] }]")
-        self.write("campaign.yaml", text)
+        self.write_measure("import nothing_of_this_name\n")
         said = self.fly_apart("campaign.yaml", "--out", "out", code=2)
         self.expect_line(said, "own.py: f: expected a Python file that can be run",
                          "nothing_of_this_name")
@@ -188,16 +194,12 @@ class FlightsTest(CampaignTest):
                                     .read_text())["certificate"], rows[2]["certificate"])
 
     def test_a_kept_run_that_another_machine_flew_may_have_another_certificate(self):
-        from sls.campaign.folder import CampaignFolder
         self.write_campaign("keep: { worst: 1, by: load_error_max }\n")
         self.fly("campaign.yaml", "--out", "out", "--allow-other-machines")
-        folder = CampaignFolder(self.folder / "out")
+        folder = self.open_out()
         kept = folder.manifest["kept"]
         self.assertNotIn("other_certificates", kept)
-        for number, _, _ in folder.chunks:  # as of a machine with another C library
-            rows = [[*cells[:-1], "0" * 64] for cells in folder.read_chunk(number)]
-            folder.chunk_file(number).unlink()
-            folder.write_chunk(number, rows)
+        self.change_certificates(folder)  # as of a machine with another C library
         self.fly("campaign.yaml", "--out", "out", "--resume")
         self.assertEqual(folder.manifest["kept"], {**kept, "other_certificates": kept["runs"]})
 
@@ -223,12 +225,7 @@ class FlightsTest(CampaignTest):
             verified = json.loads((self.folder / "out/manifest.json").read_text())["verified"]
             self.assertEqual(len(set(verified["runs"])), 4)
             # Wrong certificates in the table are found.
-            from sls.campaign.folder import CampaignFolder
-            folder = CampaignFolder(self.folder / "out")
-            for number, _, _ in folder.chunks:
-                rows = [[*cells[:-1], "0" * 64] for cells in folder.read_chunk(number)]
-                folder.chunk_file(number).unlink()
-                folder.write_chunk(number, rows)
+            self.change_certificates(self.open_out())
             said = self.fly("campaign.yaml", "--out", "out", "--resume", "--verify", 1, "--domain",
                             domain, code=1)
             self.assertRegex(said, rf"verify: run \d: expected certificate {'0' * 64}, got [0-9a-f]{{64}}")

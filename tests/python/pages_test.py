@@ -336,8 +336,7 @@ class SceneTest(support.FolderTest):
     @without_drawing
     def test_a_program_that_fails_leaves_a_report_without_scene_and_one_line(self):
         write_recording(self.folder / "r", last=50)
-        program = self.write("fails", "#!/bin/sh\necho first >&2\necho 'error: no page' >&2\nexit 1\n")
-        program.chmod(0o755)
+        program = self.write("fails", "#!/bin/sh\necho first >&2\necho 'error: no page' >&2\nexit 1\n", 0o755)
         page, output = self.make_report("r", program)
         self.assertNotIn("<iframe", page.read_text())
         self.assertEqual(output, f"{NO_SCENE}error: no page\nsls: report: r/report.html\n")
@@ -349,8 +348,7 @@ class SceneTest(support.FolderTest):
     @unittest.skipUnless(browser.PROGRAM, browser.MISSING)
     def test_the_scene_is_not_printed(self):
         write_recording(self.folder / "r", last=0)
-        program = self.write("scene", '#!/bin/sh\necho "<p>scene" > "$3"\n')
-        program.chmod(0o755)
+        program = self.write("scene", '#!/bin/sh\necho "<p>scene" > "$3"\n', 0o755)
         page, _ = self.make_report("r", program)
         self.assertIn("<iframe", page.read_text())
         with_scene = browser.count_printed_pages(page)
@@ -360,8 +358,7 @@ class SceneTest(support.FolderTest):
     @without_drawing
     def test_a_program_that_writes_too_much_leaves_a_report_without_scene(self):
         write_recording(self.folder / "r", last=50)
-        program = self.write("much", '#!/bin/sh\nhead -c 5000000 /dev/zero | tr "\\0" x > "$3"\n')
-        program.chmod(0o755)
+        program = self.write("much", '#!/bin/sh\nhead -c 5000000 /dev/zero | tr "\\0" x > "$3"\n', 0o755)
         page, output = self.make_report("r", program)
         self.assertNotIn("<iframe", page.read_text())
         self.assertIn(f"{NO_SCENE}expected at most", output)

@@ -10,7 +10,6 @@ import pathlib
 import re
 import sys
 import tempfile
-import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build"
@@ -28,23 +27,11 @@ except ImportError as error:
     print(f"skipped: {error} (apt-get install python3-numpy python3-matplotlib python3-yaml; ./sls build)")
     sys.exit(77)
 
+import folder_test  # noqa: E402
 from own_domain import OwnDomain  # noqa: E402, F401
 
 
-class FolderTest(unittest.TestCase):
-    """A test with its own folder."""
-
-    def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
-
-    def write(self, name, text):
-        path = self.folder / name
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
-        return path
-
+class FolderTest(folder_test.FolderTest):
     def run_sls(self, *arguments):
         """Runs the command line in the test's folder. Returns exit code and output."""
         from sls.__main__ import main

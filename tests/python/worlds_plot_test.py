@@ -3,12 +3,10 @@
 import io
 import os
 import sys
-import tempfile
 import unittest
 from contextlib import redirect_stderr, redirect_stdout
-from pathlib import Path
 
-import support  # noqa: F401
+import support
 
 from sls import worlds_plot
 
@@ -19,22 +17,15 @@ ROWS = """seed,loss,delay_ms,faults,finished,duration_s,take_overs,late_steps,wo
 """
 
 
-class WorldsPlotTest(unittest.TestCase):
-    def setUp(self):
-        self.folder = Path(self.enterContext(tempfile.TemporaryDirectory()))
-
+class WorldsPlotTest(support.FolderTest):
     def make_program(self, script):
         """A stand-in for sls_worlds."""
-        program = self.folder / "program"
-        program.write_text(f"#!{sys.executable}\nimport sys, pathlib\n{script}")
-        program.chmod(0o755)
+        program = self.write("program", f"#!{sys.executable}\nimport sys, pathlib\n{script}", 0o755)
         os.environ["SLS_WORLDS"] = str(program)
         self.addCleanup(os.environ.pop, "SLS_WORLDS")
 
     def test_every_world_is_in_it_once(self):
-        table = self.folder / "worlds.csv"
-        table.write_text(ROWS)
-        figure = worlds_plot.plot_worlds(worlds_plot.read_worlds(table))
+        figure = worlds_plot.plot_worlds(worlds_plot.read_worlds(self.write("worlds.csv", ROWS)))
         for axes, values in zip(figure.axes, ([1.5, 2.5], [0.25, 0.5])):
             points = [xy for line in axes.lines if line.get_marker() == "." for xy in line.get_xydata().tolist()]
             finished = sorted(point for point in points if point[1] == point[1])

@@ -1,6 +1,6 @@
 // Reserves a domain for the test and publishes on it as a server, a controller and a recorder. The
 // numbers follow formulas that channels_test.mjs repeats. stdout: {"domain":N}; then one JSON line
-// for each command on stdin: "reset", "fleet VEHICLES", "pace MS", "rest", "burst RATE SECONDS".
+// for each command on stdin: "reset", "fleet VEHICLES", "rest", "burst RATE SECONDS".
 // Ends at the end of stdin.
 //   view_foxglove_publisher hold|publish
 #include <poll.h>
@@ -237,9 +237,8 @@ void publish(int domain) {
   constexpr std::uint64_t kFirstRun = 0x1111;
   Publisher publisher(domain);
   publisher.begin_run(kFirstRun, {0, 7});
-  auto pace = 20ms;
   bool is_resting = false;
-  while (const auto line = read_line(is_resting ? 100ms : pace)) {
+  while (const auto line = read_line(is_resting ? 100ms : 20ms)) {
     std::istringstream words(*line);
     std::string command;
     double number = 0, seconds = 0;
@@ -250,7 +249,6 @@ void publish(int domain) {
       std::iota(vehicles.begin(), vehicles.end(), 0U);
       publisher.begin_run(kFirstRun + 2, vehicles);
     }
-    if (command == "pace") pace = std::chrono::milliseconds(static_cast<int>(number));
     if (command == "rest") is_resting = true;
     if (command == "burst")
       std::cout << "{\"written\":" << publisher.burst(number, seconds) << "}" << std::endl;

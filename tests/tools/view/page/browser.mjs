@@ -32,11 +32,11 @@ export async function startBrowser({ flags = [] } = {}) {
 }
 
 /** A tab that shares nothing with the others; `errors` and `requests` grow. */
-export async function open(browser, { width = 1366, height = 768, scheme = "dark", touch = false } = {}) {
+export async function open(browser, { width = 1366, height = 768, scheme = "dark", touch = false, motion = "no-preference" } = {}) {
   const context = await browser.createBrowserContext();
   const page = await context.newPage();
   await page.setViewport({ width, height, hasTouch: touch, isMobile: touch, deviceScaleFactor: 1 });
-  await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }]);
+  await page.emulateMediaFeatures([{ name: "prefers-color-scheme", value: scheme }, { name: "prefers-reduced-motion", value: motion }]);
   const errors = [];
   const requests = [];
   // Chromium warns of its own reading, where the GPU does not draw the page.

@@ -8,14 +8,12 @@ import { waitFor } from "./browser.mjs";
 
 const source = join(dirname(fileURLToPath(import.meta.url)), "../../../..");
 
-/** `build`: the build tree. `scenario`: name in config/scenarios. Returns { url, status, stop, … }. */
-export async function startFlight({ build, domain, scenario = "figure_eight", vehicles = 1, port = 0 }) {
+/** `build`: the build tree. Returns { url, status, stop, … }. */
+export async function startFlight({ build, domain }) {
   const folder = mkdtempSync(join(tmpdir(), "sls-view-flight-"));
   const file = join(folder, "scenario.yaml");
-  let text = readFileSync(join(source, "config/scenarios", `${scenario}.yaml`), "utf8");
-  text = text.replace("for_s: 32", "for_s: 3600"); // longer than any test or measurement, also on a slow machine
-  if (vehicles > 1) text = text.replace(/^vehicles: .*$/m, `vehicles: ${vehicles}`);
-  writeFileSync(file, text);
+  const text = readFileSync(join(source, "config/scenarios/figure_eight.yaml"), "utf8");
+  writeFileSync(file, text.replace("for_s: 32", "for_s: 3600")); // longer than any test, also on a slow machine
   const programs = [];
   const start = (name, ...args) => {
     const child = spawn(join(build, "bin", name), ["--domain", String(domain), ...args], { stdio: ["ignore", "ignore", "pipe"] });
@@ -37,7 +35,7 @@ export async function startFlight({ build, domain, scenario = "figure_eight", ve
     const url = await waitFor("address of sls_view", () => /page: (http:\S+)/.exec(viewer.log)?.[1]);
     return { viewer, url };
   };
-  let { viewer, url } = await startViewer(port);
+  let { viewer, url } = await startViewer(0);
   start("sim_server", "--scenario", file, "--mode", "realtime", "--rtf", "1");
   start("control_client", "--scenario", file);
   start("recorder", "--out", join(folder, "recording"));

@@ -7,7 +7,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { fileURLToPath, pathToFileURL } from "node:url";
-import { kLean, startBrowser } from "../page/browser.mjs";
+import { kLean, open as openTab, readPixels, startBrowser } from "../page/browser.mjs";
 
 const root = fileURLToPath(new URL("../../../..", import.meta.url));
 const bin = join(process.env.SLS_BUILD ?? join(root, "build"), "bin");
@@ -34,16 +34,10 @@ function readColumns(file) {
   return lines.map((fields) => Object.fromEntries(header.map((name, index) => [name, Number(fields[index])])));
 }
 
-/** Opens a page; `problems` gets its console messages and errors, and `requests` its network requests. */
-async function open(address, { reducedMotion = true } = {}) {
-  const page = await browser.newPage();
-  const problems = [];
-  const requests = [];
-  page.on("console", (message) => /ReadPixels/.test(message.text()) || problems.push(message.text()));
-  page.on("pageerror", (error) => problems.push(error.message));
-  page.on("request", (request) => request.url().startsWith("data:") || requests.push(request.url()));
-  await page.setViewport({ width: 1280, height: 800 });
-  await page.emulateMediaFeatures([{ name: "prefers-reduced-motion", value: reducedMotion ? "reduce" : "no-preference" }]);
+/** Opens a page; `problems` gets all its console messages and errors, and `requests` its network requests. */
+async function open(address, { motion = "reduce" } = {}) {
+  const { page, errors: problems, requests } = await openTab(browser, { width: 1280, height: 800, scheme: "light", motion });
+  page.on("console", (message) => ["error", "warn"].includes(message.type()) || problems.push(message.text()));
   await page.goto(address, { timeout: kTimeout });
   return { page, problems, requests };
 }
@@ -56,20 +50,6 @@ const drag = (page, time) => page.$eval("#time", (slider, value) => {
   slider.value = value;
   slider.dispatchEvent(new Event("input"));
 }, String(time));
-
-/** Colour on the screen: red, green, blue. Decoded in another page, because the tested page forbids every fetch. */
-async function readPixel(page, [x, y]) {
-  const picture = await page.screenshot({ encoding: "base64", clip: { x: Math.round(x), y: Math.round(y), width: 1, height: 1 } });
-  const reader = await browser.newPage();
-  const colour = await reader.evaluate(async (data) => {
-    const image = await createImageBitmap(await (await fetch(`data:image/png;base64,${data}`)).blob());
-    const context = new OffscreenCanvas(1, 1).getContext("2d");
-    context.drawImage(image, 0, 0);
-    return [...context.getImageData(0, 0, 1, 1).data].slice(0, 3);
-  }, picture);
-  await reader.close();
-  return colour;
-}
 
 before(async () => {
   chromium = await startBrowser({ flags: kLean });
@@ -110,10 +90,10 @@ test("the slider shows the positions of the CSV file, and the load's colour is w
   await page.click("[data-camera=follow]");
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
   const { load } = await page.evaluate("window.slsView.projection(0)");
-  const [red, green, blue] = await readPixel(page, load);
+  const [[red, green, blue]] = await readPixels(browser, await page.screenshot(), [load]);
   assert.ok(red > 150 && green > 70 && green < 200 && blue < 120, `the load is orange, got ${red}, ${green}, ${blue}`);
   assert.deepEqual(problems, []);
-  assert.deepEqual(requests.filter((address) => !address.startsWith("file:")), []);
+  assert.deepEqual(requests.filter((address) => !/^(file|data):/.test(address)), []);
   await page.close();
 });
 
@@ -141,8 +121,7 @@ test("one load is drawn at its centre, and its cables are taut, hang slack or ar
   const scale = camera.area.height / camera.height_m;
   const [x, y] = [camera.area.left + camera.area.width / 2 + (row.load_x_m - camera.target_m[0]) * scale,
     camera.area.top + camera.area.height / 2 + (fold - 0.1 - camera.target_m[2]) * scale];
-  const colours = [];
-  for (const off of [-1, 0, 1]) colours.push(await readPixel(drop.page, [x + off, y]));
+  const colours = await readPixels(browser, await drop.page.screenshot(), [-1, 0, 1].map((off) => [x + off, y]));
   assert.ok(colours.some((colour) => isNear(colour, [153, 161, 171], 8)), `a slack cable, got ${colours.join("  ")}`);
   [, points] = await show(drop.page, "side", 0.9);
   assert.equal(points.length, 2, "taut");
@@ -164,15 +143,16 @@ test("one load is drawn at its centre, and its cables are taut, hang slack or ar
   const metre = camera.area.height / camera.height_m;
   const pixel = [camera.area.left + camera.area.width / 2 + (centre[1] - camera.target_m[1]) * metre,
     camera.area.top + camera.area.height / 2 - (centre[0] - camera.target_m[0]) * metre];
-  const seen = []; // below a rotor, whose disc is faint; a blade may cross some of these places
-  for (const off of [-3, 0, 3]) seen.push(await readPixel(cut.page, [pixel[0] + off, pixel[1] + off]));
+  // Below a rotor, whose disc is faint; a blade may cross some of these places.
+  const places = [-3, 0, 3].map((off) => pixel.map((at) => at + off));
+  const seen = await readPixels(browser, await cut.page.screenshot(), places);
   assert.ok(seen.some((colour) => isNear(colour, [0xe0, 0x86, 0x00], 30)), `the load at its centre, got ${seen.join("  ")}`);
   assert.deepEqual(cut.problems, []);
   await cut.page.close();
 });
 
 test("it plays by itself, at the chosen speed, and by keys", async () => {
-  const { page, problems } = await open(pathToFileURL(join(folder, "one.html")).href, { reducedMotion: false });
+  const { page, problems } = await open(pathToFileURL(join(folder, "one.html")).href, { motion: "no-preference" });
   await waitFor(page, () => window.slsView?.state().sim_time_s > 0.2);
   await page.keyboard.press(" ");
   const paused = await stateOf(page);
@@ -243,7 +223,7 @@ test("sls_view serves two recordings, and says what is wrong with a folder that 
   const { page, problems, requests } = await open(address);
   await waitFor(page, () => window.slsView);
   assert.deepEqual((await stateOf(page)).recordings, ["first", "second"]);
-  assert.ok(requests.every((request) => request.startsWith(address)), `${requests}`);
+  assert.ok(requests.every((request) => request.startsWith(address) || request.startsWith("data:")), `${requests}`);
   assert.deepEqual(problems, []);
   await page.close();
 });
@@ -317,6 +297,6 @@ test("the report shows the scene, needs nothing else and has at most 4 MB", asyn
   const pose = await frame.evaluate("window.slsView.pose(0)");
   assert.ok(Math.abs(pose.load[0] - row.load_x_m) < 1e-4 && Math.abs(pose.load[2] - row.load_z_m) < 1e-4);
   assert.deepEqual(problems, []);
-  assert.deepEqual(requests.filter((address) => !/^(file|about):/.test(address)), []);
+  assert.deepEqual(requests.filter((address) => !/^(file|about|data):/.test(address)), []);
   await page.close();
 });
