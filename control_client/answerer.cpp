@@ -2,8 +2,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include <utility>
-
 #include "common/bus/convert.hpp"
 
 namespace sls::control {

@@ -1,7 +1,6 @@
 #include "control_client/flight_controller.hpp"
 
 #include <cstring>
-#include <optional>
 #include <stdexcept>
 
 #include "control_client/around_law.hpp"

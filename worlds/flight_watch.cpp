@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <tuple>
 
 #include "common/bus/topics.hpp"
 #include "common/sync/membership.hpp"

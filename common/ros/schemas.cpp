@@ -1,7 +1,6 @@
 #include "common/ros/schemas.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <map>
 #include <sstream>
 #include <vector>

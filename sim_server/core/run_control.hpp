@@ -13,7 +13,7 @@
 
 namespace sls::sim {
 
-/// Rules of acceptance: sim_server/README.md, "Operator control".
+/// Rules of acceptance: docs/synchronisation.md, "Operator control".
 class RunControl {
  public:
   /// Controls run `run_id`, which begins unpaused unless `is_paused`.

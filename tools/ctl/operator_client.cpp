@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <random>
 #include <thread>
-#include <vector>
 
 #include "common/app/log.hpp"
 #include "common/app/run_main.hpp"

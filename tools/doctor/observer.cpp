@@ -12,7 +12,6 @@
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 
-#include <algorithm>
 #include <array>
 #include <mutex>
 #include <set>

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "common/model/math.hpp"
 #include "control_client/laws/error_integral.hpp"
 
 namespace sls::control {

@@ -1,7 +1,5 @@
 #include "sim_server/autopilots/px4/attitude_control.hpp"
 
-#include <algorithm>
-
 #include "common/model/math.hpp"
 
 namespace sls::sim::px4 {

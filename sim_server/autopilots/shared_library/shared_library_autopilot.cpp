@@ -1,5 +1,4 @@
 // An autopilot from a shared library of the user: sls_autopilot.h.
-#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <memory>

@@ -1,6 +1,6 @@
 /// Judges every answer: accepts one per step, and gives the cause if it rejects one. No network
 /// here.
-/// Rules: sim_server/README.md, "Commands" and "Standby".
+/// Rules: docs/synchronisation.md, "Acceptance of answers" and "Standby and take-over".
 #pragma once
 
 #include <Eigen/Core>

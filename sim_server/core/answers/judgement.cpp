@@ -4,7 +4,6 @@
 
 #include <cmath>
 #include <utility>
-#include <variant>
 
 namespace sls::sim {
 namespace {

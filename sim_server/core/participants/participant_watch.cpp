@@ -3,7 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <chrono>
-#include <utility>
 #include <vector>
 
 namespace sls::sim {

@@ -9,7 +9,7 @@
 namespace sls::sim {
 
 /// Says which controllers do not answer, or only with refused answers, and when all answer again.
-/// Rules: sim_server/README.md, "Waiting".
+/// Rules: docs/synchronisation.md, "Waiting for participants".
 class AbsenceReport {
  public:
   AbsenceReport(const Fleet& fleet, const ParticipantWatch& watch, RunReport& report,

@@ -22,7 +22,8 @@ inline constexpr const char* kFailSafeName = "fail-safe";
 Eigen::Vector3d calc_fail_safe_force(const model::SlungLoadParameters& vehicle,
                                      const model::SlungLoadState& state, double force_limit);
 
-/// Reaction to a missing answer, by `sync.wait.controller`. Rules: sim_server/README.md, "Waiting".
+/// Reaction to a missing answer, by `sync.wait.controller`. Rules:
+/// docs/synchronisation.md, "Waiting for participants".
 enum class AbsenceAction {
   kWait,      ///< wait for the answer
   kHold,      ///< fly this step with the last answer

@@ -1,7 +1,6 @@
 #include "sim_server/plants/multirotor/airframe.hpp"
 
 #include <Eigen/LU>
-#include <cmath>
 
 #include "sim_server/plants/inertia.hpp"
 

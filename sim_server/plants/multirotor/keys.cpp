@@ -4,7 +4,6 @@
 
 #include "common/config/own_keys.hpp"
 #include "sim_server/plants/inertia.hpp"
-#include "sim_server/plants/multirotor/airframe.hpp"
 
 namespace sls::sim {
 namespace {

@@ -4,10 +4,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <optional>
-#include <stdexcept>
 #include <string>
 
 #include "sim_server/plants/multirotor/keys.hpp"

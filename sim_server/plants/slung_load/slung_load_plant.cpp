@@ -3,10 +3,7 @@
 #include <Simbody.h>
 
 #include <Eigen/Geometry>
-#include <cmath>
 #include <cstdint>
-#include <stdexcept>
-#include <string>
 
 #include "common/model/forces.hpp"
 #include "sim_server/plants/rod_frame.hpp"
