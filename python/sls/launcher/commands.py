@@ -214,8 +214,8 @@ def network_table(words: list[str]) -> NoReturn:
 
 def test(words: list[str]) -> NoReturn:
     parser = Parser("test", "[--slow | --sanitize KIND] [--only REGEX]",
-                    "Sets up, builds and runs the tests, the unit suites with AddressSanitizer. build/test.xml\n"
-                    "has the output of each.")
+                    "Sets up, builds and runs the tests, the unit suites with AddressSanitizer.\n"
+                    "build/test.xml has the output of each.")
     parser.add_argument("--slow", action="store_true",
                         help="also run the tests that take minutes; they need an idle machine")
     parser.add_argument("--sanitize", type=one_of("address", "thread"), metavar="KIND",
