@@ -95,7 +95,9 @@ class Csv {
     const auto end = std::to_chars(text.data(), text.data() + text.size(), number).ptr;
     return *this << std::string(text.data(), end);
   }
-  Csv& operator<<(const double (&vector)[3]) { return *this << vector[0] << vector[1] << vector[2]; }
+  Csv& operator<<(const double (&vector)[3]) {
+    return *this << vector[0] << vector[1] << vector[2];
+  }
   void end_row() {
     stream_ << '\n';
     separator_ = "";
@@ -248,8 +250,8 @@ class Recorder {
       if (recording_->has_last && run().has_ended()) break;
       const bool is_over = run().has_ended() || find_silence() > DDS_SECS(30);
       if (end == 0 && is_over) end = dds_time() + DDS_SECS(10);
-      is_ready_ = is_ready_ ||
-                  (hears(recording_->reader, run().server) && hears(status_, run().server));
+      is_ready_ =
+          is_ready_ || (hears(recording_->reader, run().server) && hears(status_, run().server));
       if (dds_time() - announced_ > DDS_MSECS(20)) announce(false);
     }
     if (!recording_) return false;

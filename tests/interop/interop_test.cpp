@@ -211,11 +211,11 @@ class SecuredInteropTest : public InteropTest {
     return Process(with_keys_ + make_command(name, domain_.number(), flags, qos("secure")));
   }
   Process start_secured_client() const {
-    return Process(with_keys_ +
-                   Words{"SLS_IDENTITY=controller", "SLS_CYCLONE_PLUGINS=" SLS_CYCLONE_PLUGINS,
-                         "CYCLONEDDS_URI=file://" SLS_SOURCE_DIR
-                         "/tests/interop/cyclone_secure.xml",
-                         kClient, domain_.text()});
+    return Process(with_keys_ + Words{"SLS_IDENTITY=controller",
+                                      "SLS_CYCLONE_PLUGINS=" SLS_CYCLONE_PLUGINS,
+                                      "CYCLONEDDS_URI=file://" SLS_SOURCE_DIR
+                                      "/tests/interop/cyclone_secure.xml",
+                                      kClient, domain_.text()});
   }
 
   const std::string keys_ = folder_ / "keys";
@@ -236,8 +236,7 @@ TEST_F(SecuredInteropTest, MyClientWithOtherKeysIsNamedWithTheReason) {
   make_keys({});
   Process server = start_secured("sim_server", {"--scenario", scenario_});
   Process client = start_secured_client();
-  const std::string who =
-      SLS_FASTDDS_VERSION > 2 ? "refused 'my_client' (" : "'my_client' (";
+  const std::string who = SLS_FASTDDS_VERSION > 2 ? "refused 'my_client' (" : "'my_client' (";
   EXPECT_TRUE(wait_until([&] {
     return holds(server.output(),
                  "): another vendor's DDS: expected keys of ./sls keys DIR --other-vendors, got "
