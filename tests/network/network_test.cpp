@@ -13,15 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-class NetworkTest : public HostsTest {
- protected:
-  /// Flies `file` in one process and, with `profile`, on three hosts, and compares.
-  Figures expect_same(const std::string& profile, const std::string& file = scenario("short")) {
-    const Profile configured(*network_, profile);
-    Flight flight(file, configured.flight_options());
-    return test::expect_same(flight, file);
-  }
-};
+class NetworkTest : public HostsTest {};
 
 TEST_F(NetworkTest, ALinkThatLosesTwentyPercent) {
   network_->lose(0.2);
