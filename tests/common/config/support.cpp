@@ -1,8 +1,11 @@
 #include "tests/common/config/support.hpp"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <regex>
 #include <stdexcept>
 
 namespace sls::config::test {
@@ -164,6 +167,18 @@ std::string find_error(const std::string& text) {
     return error.what();
   }
   return "no error";
+}
+
+void expect_every_key(const std::string& text, const Scenario& expected) {
+  const std::string written = to_yaml(parse_scenario(text, "file"));
+  EXPECT_EQ(to_yaml(parse_scenario(written, "written")), to_yaml(expected));
+  const std::regex key("[a-z_0-9]+:");
+  const auto count = [&](const std::string& in, const std::string& wanted) {
+    return std::count_if(std::sregex_iterator(in.begin(), in.end(), key), {},
+                         [&](const std::smatch& found) { return found.str() == wanted; });
+  };
+  for (std::sregex_iterator at(text.begin(), text.end(), key), end; at != end; ++at)
+    EXPECT_GE(count(written, at->str()), count(text, at->str())) << at->str() << '\n' << written;
 }
 
 std::vector<std::filesystem::path> list_yaml_files(const std::string& folder) {

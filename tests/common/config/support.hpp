@@ -39,6 +39,10 @@ std::string read_text(const std::filesystem::path& file);
 extern const char* const kEveryKey;
 extern const char* const kEveryMultirotorKey;
 
+/// Reads `text`, writes it and reads that: reader and writer must know each key of it, and give
+/// `expected`.
+void expect_every_key(const std::string& text, const Scenario& expected);
+
 /// A short valid scenario, one key per line, in which tests replace parts.
 extern const char* const kMinimalScenario;
 
