@@ -8,6 +8,8 @@
 #include <regex>
 #include <stdexcept>
 
+#include "tests/support/errors.hpp"
+
 namespace sls::config::test {
 const char* const kMinimalScenario =
     "name: minimal\n"
@@ -160,13 +162,19 @@ mission:
     for_s: 1
 )";
 
+std::string make_autopilot_text(const std::string& autopilot) {
+  return replace_once(kMinimalScenario, "plant:\n",
+                      "autopilot: " + autopilot +
+                          "\n"
+                          "plant:\n"
+                          "  model: multirotor\n"
+                          "  inertia_kg_m2: [0.03, 0.03, 0.06]\n"
+                          "  rotor: { thrust_constant_n_s2: 5.0e-6, max_speed_rad_s: 2000 }\n"
+                          "  rotors: [{ position_m: [0, 0, 0], spin: ccw }]\n");
+}
+
 std::string find_error(const std::string& text) {
-  try {
-    parse_scenario(text, "file");
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "no error";
+  return sls::test::find_error<ConfigError>([&] { parse_scenario(text, "file"); });
 }
 
 void expect_every_key(const std::string& text, const Scenario& expected) {
