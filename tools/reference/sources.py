@@ -153,12 +153,13 @@ def load_keys(build):
 
 def load_topics():
     """[(name, type, flow)], as common/bus/topics.hpp has them."""
-    found = re.findall(r"struct Topic<(\w+)> \{\s*static constexpr TopicId kId = TopicId::k\w+;\s*"
-                       r'static constexpr const char\* kName = "([^"]+)";\s*'
-                       r"static constexpr Flow kFlow = Flow::k(\w+);", read("common/bus/topics.hpp"))
-    if not found:
-        raise SystemExit("common/bus/topics.hpp: expected topics, got none")
-    return [(name, message, flow) for message, name, flow in found]
+    text = read("common/bus/topics.hpp")
+    names = re.findall(r'"(sls/\w+)"', text)
+    found = re.findall(r"struct Topic<(\w+)> : TopicOf<TopicId::k\w+, Flow::k(\w+)>", text)
+    if not found or len(found) != len(names):
+        raise SystemExit("common/bus/topics.hpp: expected topics and as many names, got "
+                         f"{len(found)} and {len(names)}")
+    return [(name, message, flow) for name, (message, flow) in zip(names, found)]
 
 
 def load_profiles():

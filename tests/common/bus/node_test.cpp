@@ -17,6 +17,7 @@
 #include "fastcdr_api.hpp"
 #include "fastdds_api.hpp"
 #include "tests/common/bus/sample_messages.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/own_domain.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/waiting.hpp"
@@ -274,12 +275,7 @@ TEST(RawReaderTest, BytesThatAreNoMessageAreNotDecoded) {
 // --- errors --------------------------------------------------------------------------------------
 
 std::string find_error(const std::filesystem::path& file, int domain) {
-  try {
-    Node node(file, domain, "test");
-  } catch (const config::ConfigError& error) {
-    return error.what();
-  }
-  return "no error";
+  return sls::test::find_error<config::ConfigError>([&] { Node(file, domain, "test"); });
 }
 
 TEST(NodeTest, NodesWithoutSharedMemoryJoinBesideThePortOfAKilledProcess) {
@@ -311,11 +307,6 @@ TEST(NodeErrorTest, ADomainOutOfRangeIsRefusedWithItsRange) {
     const std::string error = find_error(kQosFile, domain);
     EXPECT_EQ(error, "--domain: expected 0 to 232, got " + std::to_string(domain));
   }
-}
-
-TEST(NodeErrorTest, AMissingQosFileIsNamed) {
-  EXPECT_EQ(find_error("/nowhere/qos.xml", own_domain()),
-            "/nowhere/qos.xml: expected a QoS file, got no such file");
 }
 
 // Profiles are global to a process: a second file would have no effect, without an error.
