@@ -101,7 +101,7 @@ def verify(folder: CampaignFolder, count: int, say: Callable[[str], None],
 
 def fly_run_over_dds(campaign: Campaign, runs: "Runs", index: int, domain: int | None) -> str:
     text = runs.scenario_text(list_yaml_values(campaign, make_values(campaign, index, index)[0]))
-    text = load_core().Scenario(None, text, str(campaign.base.parent), ALL_TAKE_PART).to_text()
+    text = load_core().Scenario(None, text, str(campaign.base.parent), ALL_TAKE_PART).text
     with tempfile.TemporaryDirectory(prefix="sls-verify-") as scratch, \
             written_scenario(text, campaign.base, Path(scratch)) as scenario:
         if domain is not None:
