@@ -54,11 +54,7 @@ def fly_all(recordings: Path, say: Callable[[str], None]) -> None:
 def cut(flight: Trajectory, stage_name: str, lap: int, name: str) -> Trajectory:
     """One lap of a flight as a separate flight that starts at time 0."""
     stage = next(stage for stage in flight.stages if stage.name == stage_name)
-    rows = split_laps(flight, stage)[lap - 1].rows
-    return replace(flight, name=name, time_s=flight.time_s[rows] - flight.time_s[rows[0]],
-                   p_WQ=flight.p_WQ[rows], p_WL=flight.p_WL[rows],
-                   p_WL_ref=flight.p_WL_ref[rows], alpha=flight.alpha[rows],
-                   beta=flight.beta[rows], f_Q_W=flight.f_Q_W[rows], stages=())
+    return flight.cut(split_laps(flight, stage)[lap - 1].rows, name)
 
 
 def plot_error_sizes(flights: Sequence[Trajectory], title: str) -> Figure:

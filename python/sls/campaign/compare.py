@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from sls.campaign.drawing import format_number
+from sls.campaign.folder import read_manifest
 from sls.campaign.pairs import Pairs, describe_changes, make_measure_rows, make_outcome_rows
-from sls.campaign.report import flatten, read_manifest
+from sls.campaign.report import flatten
 from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs, to_word
 from sls.input_error import InputError
 

@@ -1,8 +1,4 @@
-"""Flies a campaign on the workers of a Dask scheduler. See README.md beside this file.
-
-A task is one chunk. The worker writes it into the campaign's folder, which must be on a file system
-that all machines share; only a small dict returns through Dask. If a worker is killed, the scheduler
-gives its chunk to another worker; after several killed workers it gives the chunk up."""
+"""Flies a campaign on the workers of a Dask scheduler. See README.md beside this file."""
 
 import logging
 import queue

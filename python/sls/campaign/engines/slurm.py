@@ -1,8 +1,4 @@
-"""Flies a campaign as job arrays of Slurm. See README.md beside this file.
-
-A task of an array flies a few chunks, which together take at least a minute. Slurm queues a task
-again when its node is lost. This process submits chunks again that are missing after all tasks have
-ended. A collect job waits for the array; it does the rest if this process has ended by then."""
+"""Flies a campaign as job arrays of Slurm. See README.md beside this file."""
 
 import getpass
 import hashlib
@@ -92,14 +88,9 @@ def list_states(name: str) -> Counter[str]:
 
 
 def describe(states: Counter[str]) -> str:
-    return ", ".join(f"{count} {state.lower() if state.isupper() else describe_state(state)}"
-                     for state, count in sorted(states.items()))
-
-
-def describe_state(state: str) -> str:
-    """Converts `PENDING Resources` to `pending (Resources)`."""
-    name, _, reason = state.partition(" ")
-    return f"{name.lower()} ({reason})"
+    """Counts and states as text: `PENDING Resources` becomes `pending (Resources)`."""
+    return ", ".join(f"{count} {name.lower()}" + (f" ({reason})" if reason else "")
+                     for state, count in sorted(states.items()) for name, _, reason in [state.partition(" ")])
 
 
 def describe_status(folder: CampaignFolder) -> list[str]:
