@@ -1,6 +1,6 @@
 """pytest's plug-in: checks as tests, and servers for tests. python/README.md, "pytest", shows the use.
 
-Everything of the package is imported late, since pytest loads the plug-in also for tests that do not fly."""
+The package's other modules are imported late, because pytest loads the plug-in also for tests that do not fly."""
 
 import os
 import re
@@ -117,7 +117,7 @@ def pytest_runtest_call(item: pytest.Item) -> None:
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: "pytest.CallInfo[None]") -> Iterator[None]:
-    """Gives the report of a failed test what the flight left, and JUnit the same as properties."""
+    """Adds page, difference and output of the flight to the report of a failed test, and to JUnit as properties."""
     is_failed = call.excinfo and call.when != "teardown" and not call.excinfo.errisinstance(pytest.skip.Exception)
     found = describe_flight(item) if is_failed and RESULT in item.stash else []
     item.user_properties += [(f"sls_{name}", text) for name, text in found if name != "output"]
@@ -126,7 +126,7 @@ def pytest_runtest_makereport(item: pytest.Item, call: "pytest.CallInfo[None]") 
 
 
 def describe_flight(item: pytest.Item) -> list[tuple[str, str]]:
-    """Makes the page of a flight that failed. Returns what the report shall say of it."""
+    """Makes the page of a failed flight. Returns the titles and texts of its sections in the report."""
     result = item.stash[RESULT]
     folder = item.config.getoption("--sls-report") or Path(result.folder).parent
     try:

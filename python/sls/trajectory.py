@@ -57,14 +57,14 @@ class Body:
 
 @dataclass(frozen=True)
 class Cable:
-    """The own cable of a vehicle that carries one load, alone or with others, and that load."""
+    """The cable of a vehicle, and the load that this vehicle carries alone or with others."""
 
     tension: np.ndarray
     """(n,), N; NaN before the first step."""
     length: np.ndarray
     """(n,), m."""
     distance: np.ndarray
-    """Of its ends, (n,), m."""
+    """Distance of its ends, (n,), m."""
     is_slack: np.ndarray
     """(n,), neither taut nor cut."""
     is_cut: np.ndarray

@@ -95,8 +95,10 @@ def fly(options: argparse.Namespace) -> None:
             say_how_to_resume(folder, options)
             raise
         say_result(folder)
-        if options.verify and not verify(folder, options):
-            raise EngineError(f"{out}: --verify: expected equal certificates, got others")
+        if options.verify:
+            from sls.campaign.verify import verify
+            if not verify(folder, options.verify, say, options.domain):
+                raise EngineError(f"{out}: --verify: expected equal certificates, got others")
         if (broken := describe_broken_measures(folder.manifest)) and not options.allow_broken_measures:
             raise EngineError(f"{out}: {broken} (--allow-broken-measures ends without an error)")
 
@@ -192,11 +194,6 @@ def say_how_to_resume(folder: CampaignFolder, options: argparse.Namespace) -> No
         command += ["--on", options.on]
     say(f"campaign: interrupted with {whole} of {count} chunks flown; to go on: "
         f"{shlex.join(command)}")
-
-
-def verify(folder: CampaignFolder, options: argparse.Namespace) -> bool:
-    from sls.campaign.verify import verify as verify_runs
-    return verify_runs(folder, options.verify, say, options.domain)
 
 
 # --- other commands -------------------------------------------------------------------------------

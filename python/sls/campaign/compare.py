@@ -40,7 +40,7 @@ def compare(a: Path, b: Path) -> str:
     check_values(*tables, *places)
     lines += describe_runs(*tables, len(places[0]))
     pairs = Pairs(*tables, *places, "A", "B")
-    lines += compare_outcomes(pairs)
+    lines += ["", "outcomes", *make_text_table(make_outcome_rows(pairs)), f"  {describe_changes(pairs)}"]
     lines += compare_measures(pairs)
     lines += list_most_different(pairs)
     return "\n".join([*lines, ""])
@@ -120,10 +120,6 @@ def describe_runs(a: RunTable, b: RunTable, common: int) -> list[str]:
     if only:
         lines.append(f"  measured only in one: {', '.join(only)}")
     return lines
-
-
-def compare_outcomes(pairs: Pairs) -> list[str]:
-    return ["", "outcomes", *make_text_table(make_outcome_rows(pairs)), f"  {describe_changes(pairs)}"]
 
 
 def compare_measures(pairs: Pairs) -> list[str]:

@@ -51,7 +51,7 @@ class Expectation:
     window_s: tuple[float, float] | None = None
     vehicle: int | None = None
     over: str = "max"
-    options: Mapping[str, Any] = field(default_factory=dict)  # further ones of a measure
+    options: Mapping[str, Any] = field(default_factory=dict)  # other options of the measure
     reason: str = ""
     because: str = ""
     expression: Expression | None = None

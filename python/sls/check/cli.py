@@ -148,7 +148,7 @@ def plan(options: argparse.Namespace, checks: Sequence[Check], folder: Path) -> 
 
 
 class Comparison:
-    """Compares the certificates of all flights of a check in lockstep, and removes recordings nobody needs any more."""
+    """Compares the certificates of all flights of a check in lockstep, and removes recordings without further use."""
 
     def __init__(self, keeps_failed: bool) -> None:
         self._first: dict[str, Result] = {}

@@ -134,12 +134,6 @@ def measure_run_s(folder: CampaignFolder, missing: Sequence[int]) -> float:
     return (time.monotonic() - begin) / count
 
 
-def make_tasks(missing: Sequence[int], chunks_each: int) -> list[list[int]]:
-    """The chunks of each task."""
-    return [list(missing[begin:begin + chunks_each])
-            for begin in range(0, len(missing), chunks_each)]
-
-
 def to_ranges(numbers: Sequence[int]) -> str:
     """Writes numbers as ranges: 3, 4, 5, 9 as `3-5 9`."""
     ranges = list[list[int]]()
@@ -231,7 +225,7 @@ def submit_round(folder: CampaignFolder, missing: Sequence[int], number: int,
     # With --chunk-runs a task flies one chunk.
     chunks_each = 1 if options.chunk_runs else max(
         1, -(-int(TASK_S / max(run_s, 1e-6)) // folder.plan.chunk_runs))
-    tasks = make_tasks(missing, chunks_each)
+    tasks = [list(missing[begin:begin + chunks_each]) for begin in range(0, len(missing), chunks_each)]
     largest = find_largest_array()
     at_once = f"%{options.workers}" if options.workers else ""
     done = Round(number)
@@ -345,7 +339,10 @@ def run(folder: CampaignFolder, options: EngineOptions) -> None:
         raise EngineError(describe_loss(folder, error)) from None
     except KeyboardInterrupt as interrupt:
         if type(interrupt) is KeyboardInterrupt:
-            cancel_quietly(folder)
+            try:
+                cancel(folder)
+            except (EngineError, ControllerLost) as error:
+                say(f"could not cancel job {name_job(folder)}: {error}")
         else:
             say(f"the jobs go on, and job {name_collect_job(folder)} makes runs.csv")
         raise
@@ -357,13 +354,6 @@ def describe_missing(folder: CampaignFolder, missing: Sequence[int], submitted: 
     first, last = folder.find_chunk(missing[0])
     return (f"slurm: {len(missing)} chunks are missing after {submitted.number} submissions, first "
             f"that of runs {first}-{last}: {find_reason(folder, submitted.jobs)}")
-
-
-def cancel_quietly(folder: CampaignFolder) -> None:
-    try:
-        cancel(folder)
-    except (EngineError, ControllerLost) as error:
-        say(f"could not cancel job {name_job(folder)}: {error}")
 
 
 # --- the collect job ------------------------------------------------------------------------------
