@@ -343,11 +343,7 @@ def measure_step(flight: Trajectory, angle: int) -> StepResponse:
 def cut_eight(flight: Trajectory, name: str) -> Trajectory:
     """Both laps as a separate flight that starts at time 0."""
     stage = next(stage for stage in flight.stages if stage.lap_s is not None)
-    rows = np.arange(stage.first, stage.end)
-    return replace(flight, name=name, time_s=flight.time_s[rows] - flight.time_s[rows[0]],
-                   p_WQ=flight.p_WQ[rows], p_WL=flight.p_WL[rows], p_WL_ref=flight.p_WL_ref[rows],
-                   alpha=flight.alpha[rows], beta=flight.beta[rows], f_Q_W=flight.f_Q_W[rows],
-                   stages=(), body=None)
+    return flight.cut(np.arange(stage.first, stage.end), name)
 
 
 def plot_plan(flights: Sequence[Trajectory]) -> Figure:

@@ -19,7 +19,8 @@ except ImportError:
 from sls.campaign import findings, predictions
 from sls.campaign.campaign_file import load_campaign
 from sls.campaign.check import check_campaign
-from sls.campaign.sampling import make_values, to_yaml_value
+from sls.campaign.sampling import make_values
+from sls.scenario import to_yaml_value
 from sls.input_error import InputError
 
 FOLDER = support.ROOT / "config/campaigns"

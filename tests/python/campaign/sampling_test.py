@@ -17,7 +17,8 @@ import pytest
 import yaml
 
 from sls.campaign.portable_math import calc_normal_cdf, calc_normal_quantile, exp, log
-from sls.campaign.sampling import choose_runs, is_certified, make_values, to_yaml_value
+from sls.campaign.sampling import choose_runs, is_certified, make_values
+from sls.scenario import to_yaml_value
 from sls.campaign.yaml_nodes import parse_yaml
 from sls.input_error import InputError
 
@@ -242,7 +243,8 @@ PRINT_DIGEST = """
 import hashlib, sys
 from pathlib import Path
 from sls.campaign.campaign_file import load_campaign
-from sls.campaign.sampling import make_values, to_yaml_value
+from sls.campaign.sampling import make_values
+from sls.scenario import to_yaml_value
 text = "".join(map(to_yaml_value, make_values(load_campaign(Path(sys.argv[1])), 0, 1999)))
 print(hashlib.sha256(text.encode()).hexdigest())
 """
