@@ -24,9 +24,10 @@ ListeningPost::ListeningPost(Ports ports) {
 void ListeningPost::work() {
   for (auto& [domain, socket] : sockets_)
     while (const auto received = socket.receive(buffer_))
-      if (auto announcement = parse_announcement(buffer_.data(), received->size)) {
-        const auto key = std::make_pair(domain, announcement->id);
-        heard_[key] = {domain, to_string(received->sender.sin_addr), std::move(*announcement)};
+      if (auto found = bus::find_announcement(buffer_.data(), received->size);
+          found && !found->is_leaving) {
+        const auto key = std::make_pair(domain, found->sender);
+        heard_[key] = {domain, to_string(received->sender.sin_addr), std::move(*found)};
       }
 }
 
