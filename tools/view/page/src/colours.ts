@@ -43,6 +43,5 @@ export function readTheme(): Theme {
 
 /** Calls `act` when the theme changes between dark and light. */
 export function onThemeChange(act: () => void): void {
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", act);
   new MutationObserver(act).observe(document.documentElement, { attributeFilter: ["data-theme"] });
 }

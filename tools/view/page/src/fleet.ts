@@ -16,6 +16,7 @@ import {
   Vector3,
   type Camera,
 } from "three";
+import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { calcCablePoints, calcColour, findLoad, hasLoad, kCableParts } from "./cables";
 import { kLoadColour, kReferenceColour, type Theme } from "./colours";
 import {
@@ -113,15 +114,9 @@ class Part {
 /** `count` copies of a geometry, with the number of the copy in attribute `copy`. */
 function repeat(geometry: BufferGeometry, count: number): BufferGeometry {
   const source = geometry.index ? geometry.toNonIndexed() : geometry;
+  source.deleteAttribute("normal").deleteAttribute("uv"); // nothing is lit
   const vertices = source.getAttribute("position").count;
-  const result = new BufferGeometry();
-  for (const name of ["position", "color"]) {
-    const attribute = source.getAttribute(name);
-    if (!attribute) continue;
-    const values = new Float32Array(count * attribute.array.length);
-    for (let copy = 0; copy < count; ++copy) values.set(attribute.array, copy * attribute.array.length);
-    result.setAttribute(name, new BufferAttribute(values, attribute.itemSize, attribute.normalized));
-  }
+  const result = mergeGeometries(new Array<BufferGeometry>(count).fill(source));
   const copies = new Float32Array(count * vertices);
   for (let copy = 0; copy < count; ++copy) copies.fill(copy, copy * vertices, (copy + 1) * vertices);
   result.setAttribute("copy", new BufferAttribute(copies, 1));

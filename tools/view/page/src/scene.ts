@@ -10,8 +10,6 @@ import { Overlay } from "./overlay";
 import { Trails } from "./trails";
 import type { CameraMode, Pose, Run, RunIndex, Trail } from "./types";
 
-export { toScene } from "./frames";
-
 const kManyVehicles = 10; // more vehicles are drawn without smooth edges
 const kSlowFrame = 40; // ms between frames above which fewer pixels are drawn
 const kQuickFrame = 22;
@@ -95,7 +93,7 @@ export class Scene {
     this.fit();
   }
 
-  setPoses(_step: number, simTime: number, poses: readonly Pose[], index: RunIndex = 0): void {
+  setPoses(simTime: number, poses: readonly Pose[], index: RunIndex = 0): void {
     const layer = this.layers[index];
     if (!layer) return;
     layer.fleet.setPoses(simTime, poses);
@@ -115,17 +113,6 @@ export class Scene {
   /** Replaces the trail that poses have left: for a jump in time of a recording. */
   setTrail(vehicleId: number, trail: Trail, index: RunIndex = 0): void {
     this.layers[index]?.trails.replace(vehicleId, trail);
-    this.invalidate();
-  }
-
-  /** Removes recording `index` from the picture. */
-  clearRun(index: RunIndex): void {
-    const layer = this.layers[index];
-    if (!layer) return;
-    layer.fleet.dispose();
-    layer.trails.dispose();
-    layer.path.removeFromParent();
-    this.layers[index] = null;
     this.invalidate();
   }
 

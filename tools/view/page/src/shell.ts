@@ -14,17 +14,18 @@ export interface Shell {
   readonly scene: Scene | null;
   readonly plots: Plots;
   selected(): number;
-  select(vehicleId: number): void;
   /** `act` is called when the user chooses another vehicle. */
   onSelect(act: (vehicleId: number) => void): void;
   setRun(run: Run, index?: RunIndex): void;
-  setPoses(step: number, simTime: number, poses: readonly Pose[], index?: RunIndex): void;
+  setPoses(simTime: number, poses: readonly Pose[], index?: RunIndex): void;
 }
 
 const kKeys: [string, string][] = [
   ["Space", "start, pause or resume"],
   ["N", "step"],
   ["Shift R / Shift S", "reset / stop"],
+];
+const kSharedKeys: [string, string][] = [
   ["1 2 3 4", "camera: orbit, follow, top, side"],
   ["F", "fit everything into the picture"],
   ["T", "table of positions"],
@@ -77,7 +78,6 @@ export function makeShell(): Shell {
     scene,
     plots,
     selected: () => selected,
-    select,
     onSelect: (act) => void (chosen = act),
     setRun(run, index = 0) {
       scene?.setRun(run, index);
@@ -89,8 +89,8 @@ export function makeShell(): Shell {
       table.setRun(run);
       select(ids.includes(selected) ? selected : (ids[0] ?? 0));
     },
-    setPoses(step, simTime, poses, index = 0) {
-      scene?.setPoses(step, simTime, poses, index);
+    setPoses(simTime, poses, index = 0) {
+      scene?.setPoses(simTime, poses, index);
       if (index === 0) table.offer(simTime, poses);
     },
   };
@@ -139,7 +139,7 @@ function setUpTheme(): void {
 
 function setUpKeys(): void {
   const dialog = find<HTMLDialogElement>("keys");
-  const list = make("dl", {}, ...kKeys.flatMap(([key, text]) => [make("dt", {}, make("kbd", {}, key)), make("dd", {}, text)]));
+  const list = make("dl", {}, ...listKeys(kKeys));
   const close = make("button", { type: "button" }, "Close");
   close.addEventListener("click", () => dialog.close());
   dialog.replaceChildren(make("h2", { id: "keys-title" }, "Keys"), list, make("div", { class: "buttons" }, close));
@@ -147,6 +147,11 @@ function setUpKeys(): void {
   document.addEventListener("keydown", (event) => {
     if (event.key === "?" && !isTyping(event)) dialog.showModal();
   });
+}
+
+/** Elements of the list of keys: `keys`, then those that live flights and recordings have. */
+export function listKeys(keys: [string, string][]): HTMLElement[] {
+  return [...keys, ...kSharedKeys].flatMap(([key, text]) => [make("dt", {}, make("kbd", {}, key)), make("dd", {}, text)]);
 }
 
 /** Positions as numbers, the alternative to the scene. Not updated while it is hidden. */

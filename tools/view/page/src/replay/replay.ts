@@ -2,7 +2,7 @@
 import { findLoad } from "../cables";
 import { find, make, setText } from "../dom";
 import { showBanner, showLines, showPhase, showRun, showStage, showTime } from "../panels";
-import { makeShell, type Shell } from "../shell";
+import { listKeys, makeShell, type Shell } from "../shell";
 import type { PageMode, Pose, RunIndex, Trail } from "../types";
 import { findLargestDistance, formatMetres } from "./comparison";
 import { loadRecording } from "./load";
@@ -20,12 +20,6 @@ const kKeys: [string, string][] = [
   ["< >", "slower or faster"],
   ["P N", "previous or next mark"],
   ["L", "loop"],
-  ["1 2 3 4", "camera: orbit, follow, top, side"],
-  ["F", "fit everything into the picture"],
-  ["T", "table of positions"],
-  ["[ ]", "previous and next vehicle"],
-  ["Arrows, + −", "turn and zoom, with the scene in focus"],
-  ["?", "these keys"],
 ];
 
 /** Shows the recordings of `mode`, or on the page the error that they have. */
@@ -50,7 +44,6 @@ class Replay {
   private readonly main: Recording;
   private readonly names: string[];
   private readonly apart: HTMLElement[] = [];
-  private marks: TimelineMark[] = [];
   private shownTime = NaN;
   private lastFrame = 0;
   private poses: Pose[] = [];
@@ -92,8 +85,7 @@ class Replay {
     const panel = find("participants-panel");
     setText(panel.querySelector("h2")!, this.recordings.length > 1 ? "Recordings" : "Recording");
     setText(find("events-panel").querySelector("h2")!, "Stages, events and faults");
-    find("keys").querySelector("dl")!.replaceChildren(
-      ...kKeys.flatMap(([key, text]) => [make("dt", {}, make("kbd", {}, key)), make("dd", {}, text)]));
+    find("keys").querySelector("dl")!.replaceChildren(...listKeys(kKeys));
     const list = find("events");
     list.setAttribute("role", "list");
     list.setAttribute("aria-live", "off");
@@ -130,9 +122,9 @@ class Replay {
       const rows = recording.rowsAs(this.main.columns, vehicleId);
       if (rows) this.shell.plots.replace(rows, index as RunIndex);
     });
-    this.marks = this.listMarks(vehicleId);
-    this.timeline.setMarks(this.marks);
-    this.shell.plots.setMarks(this.marks.flatMap((mark) =>
+    const marks = this.listMarks(vehicleId);
+    this.timeline.setMarks(marks);
+    this.shell.plots.setMarks(marks.flatMap((mark) =>
       mark.to === undefined ? [mark] : [mark, { ...mark, time: mark.to, text: `${mark.text} ends` }]));
     this.showRecordings(vehicleId);
     this.shownTime = NaN;
@@ -154,7 +146,6 @@ class Replay {
   }
 
   private showRecordings(vehicleId: number): void {
-    const place = find("participants");
     this.apart.length = 0;
     const value = () => {
       const element = make("dd");
@@ -174,7 +165,7 @@ class Replay {
       list.append(make("dt", {}, "at most"), make("dd", { id: "most-apart" },
         Number.isFinite(largest.time) ? `${formatMetres(largest.distance)} at ${formatTime(largest.time)} s` : "–"));
     }
-    place.replaceChildren(list);
+    find("participants").replaceChildren(list);
   }
 
   private drawFrame(now: number): void {
@@ -202,8 +193,7 @@ class Replay {
       this.shownTime = time;
       this.recordings.forEach((recording, index) => {
         const poses = recording.posesAt(time);
-        const step = Math.round(time / recording.run.period_s);
-        this.shell.setPoses(step, time, poses, index as RunIndex);
+        this.shell.setPoses(time, poses, index as RunIndex);
         if (index === 0) this.poses = poses;
       });
       this.shell.plots.setCursor(time);
@@ -234,7 +224,6 @@ class Replay {
         camera: () => scene?.camera() ?? null,
         cable: (vehicleId: number) => scene?.cable(vehicleId) ?? null,
         frames: () => scene?.frames() ?? 0,
-        fps: () => scene?.fps() ?? 0,
         seek: (time: number) => {
           this.player.pause();
           this.player.seek(time);
@@ -243,9 +232,7 @@ class Replay {
         state: () => ({
           sim_time_s: this.player.time,
           is_playing: this.player.isPlaying,
-          selected: this.shell.selected(),
           recordings: this.names,
-          marks: this.marks.length,
           has_scene: scene !== null,
         }),
         pose: (vehicleId: number) => {

@@ -43,8 +43,7 @@ export class Timeline {
     });
     this.slider.addEventListener("input", () => this.seek(Number(this.slider.value)));
     this.band = make("div", { class: "timeline-band", "aria-hidden": "true" });
-    const track = make("div", { class: "timeline-track" });
-    track.append(this.band, this.slider);
+    const track = make("div", { class: "timeline-track" }, this.band, this.slider);
 
     this.label = make("output", { class: "timeline-time", "aria-live": "off" });
     this.stage = make("span", { class: "timeline-now" });
@@ -56,8 +55,8 @@ export class Timeline {
     });
     this.loop = make("input", { type: "checkbox" });
     this.loop.addEventListener("change", () => (player.loops = this.loop.checked));
-    const controls = make("div", { class: "timeline-controls" });
-    controls.append(this.playButton, this.label, this.stage, labelled("Speed", this.speed), labelled("Loop", this.loop));
+    const controls = make("div", { class: "timeline-controls" }, this.playButton, this.label, this.stage,
+      make("label", {}, "Speed ", this.speed), make("label", {}, "Loop ", this.loop));
     element.append(controls, track);
     document.addEventListener("keydown", (event) => this.handleKey(event));
     this.update();
@@ -81,13 +80,11 @@ export class Timeline {
     );
     this.options.list.replaceChildren(
       ...this.marks.map((mark) => {
-        const button = make("button", { type: "button" });
         const time = make("time", {}, `${formatTime(mark.time)} s`);
-        button.append(time, make("span", { class: `timeline-key timeline-${mark.kind}` }), mark.text);
+        const key = make("span", { class: `timeline-key timeline-${mark.kind}` });
+        const button = make("button", { type: "button" }, time, key, mark.text);
         button.addEventListener("click", () => this.seek(mark.time));
-        const item = make("li");
-        item.append(button);
-        return item;
+        return make("li", {}, button);
       }),
     );
   }
@@ -160,10 +157,4 @@ export class Timeline {
 /** Seconds with two decimals. */
 export function formatTime(seconds: number): string {
   return seconds.toFixed(2);
-}
-
-function labelled(text: string, control: HTMLElement): HTMLLabelElement {
-  const label = make("label");
-  label.append(`${text} `, control);
-  return label;
 }
