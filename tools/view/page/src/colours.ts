@@ -1,4 +1,12 @@
-const readColour = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const root = document.documentElement;
+
+/** The colour of a custom property; a theme chooses between the two of `light-dark`. */
+function readColour(name: string): string {
+  root.style.color = `var(--${name})`;
+  const { color } = getComputedStyle(root);
+  root.style.color = "";
+  return color;
+}
 
 /**
  * Colours of the vehicle's parts (python/sls/colours.css): the same in dark and light, unlit, so that the colour of a
@@ -43,5 +51,5 @@ export function readTheme(): Theme {
 
 /** Calls `act` when the theme changes between dark and light. */
 export function onThemeChange(act: () => void): void {
-  new MutationObserver(act).observe(document.documentElement, { attributeFilter: ["data-theme"] });
+  new MutationObserver(act).observe(root, { attributeFilter: ["data-theme"] });
 }
