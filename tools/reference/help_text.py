@@ -33,6 +33,10 @@ class Help:
     options: list
     subcommands: list
 
+    def list_own(self):
+        """Arguments and options but --help and --version."""
+        return self.positionals + [option for option in self.options if not {"--help", "--version"} & set(option.names)]
+
 
 def _split_lines(text):
     """(spec, meaning) of every indented entry, with the lines that continue it joined."""

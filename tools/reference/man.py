@@ -63,8 +63,7 @@ def make_program(name, parsed, subcommands, version, names):
         if items:
             text += f".SH {title}\n" + make_items(items)
     for subcommand, its_help in subcommands.items():
-        own = its_help.positionals + [option for option in its_help.options if "--help" not in option.names]
-        if own:
+        if own := its_help.list_own():
             text += f'.SH "OPTIONS OF {subcommand.upper()}"\n' + make_items(own)
     return text + make_end(name, names)
 

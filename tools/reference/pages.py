@@ -113,15 +113,18 @@ def to_rows(items):
 def describe_help(name, parsed, level):
     text = f"\n{'#' * level} {name}\n\n{parsed.description}\n\n"
     text += "".join(f"    {usage}\n" for usage in parsed.usage)
-    items = parsed.positionals + parsed.options
-    if items:
+    if items := parsed.list_own():
         text += "\n" + make_table(["argument", "values", "default", "meaning"], to_rows(items))
+    if parsed.subcommands:
+        text += "\n" + make_table(["command", "meaning"],
+                                  [[f"`{item.spell()}`", item.text] for item in parsed.subcommands])
     return text
 
 
 def make_commands_page(build):
     text = "# Commands and options\n\n" + NOTE + """
-First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints.
+First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints. The tables leave out
+`--help` and `--version`, which every program has.
 [Exit codes](error-codes.md) are the same for all programs.
 
 ## ./sls
@@ -141,7 +144,8 @@ First the commands of `./sls`, then the programs that they start. Each text is w
     for name, (parsed, subcommands) in programs.items():
         text += describe_help(name, parsed, 2)
         for subcommand, its_help in subcommands.items():
-            text += describe_help(f"{name} {subcommand}", its_help, 3)
+            if its_help.list_own():
+                text += describe_help(f"{name} {subcommand}", its_help, 3)
     return text
 
 
