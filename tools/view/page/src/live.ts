@@ -69,7 +69,7 @@ class Live {
       this.wait = kFirstWait;
       this.retry();
     });
-    this.exposeMeasurements();
+    shell.expose({ state: () => this.getState() });
     this.connect();
   }
 
@@ -221,30 +221,15 @@ class Live {
     showStatus(this.status, this.run, this.calcLatency(), this.shell.scene?.fps() ?? 0);
   }
 
-  /** For tests. */
-  private exposeMeasurements(): void {
-    const { scene } = this.shell;
-    Object.assign(window, {
-      slsView: {
-        redraw: () => scene?.invalidate(),
-        frames: () => scene?.frames() ?? 0,
-        projection: (vehicleId: number) => scene?.projection(vehicleId) ?? null,
-        camera: () => scene?.camera() ?? null,
-        state: () => ({
-          is_connected: this.socket?.readyState === WebSocket.OPEN,
-          phase: this.status?.phase ?? null,
-          step: this.newest?.step ?? null,
-          sim_time_s: this.newest?.simTime ?? null,
-          selected: this.shell.selected(),
-          has_scene: scene !== null,
-        }),
-        /** Positions of the newest step, frame W. */
-        pose: (vehicleId: number) => {
-          const pose = this.newest?.poses.find((candidate) => candidate.vehicleId === vehicleId);
-          return pose ? { quad: Array.from(pose.quad), load: Array.from(pose.load) } : null;
-        },
-      },
-    });
+  private getState() {
+    return {
+      is_connected: this.socket?.readyState === WebSocket.OPEN,
+      phase: this.status?.phase ?? null,
+      step: this.newest?.step ?? null,
+      sim_time_s: this.newest?.simTime ?? null,
+      selected: this.shell.selected(),
+      has_scene: this.shell.scene !== null,
+    };
   }
 }
 

@@ -18,6 +18,8 @@ export interface Shell {
   onSelect(act: (vehicleId: number) => void): void;
   setRun(run: Run, index?: RunIndex): void;
   setPoses(simTime: number, poses: readonly Pose[], index?: RunIndex): void;
+  /** Adds `window.slsView` with `own` functions, for tests. */
+  expose(own: object): void;
 }
 
 const kKeys: [string, string][] = [
@@ -43,6 +45,7 @@ export function makeShell(): Shell {
   const picker = find<HTMLSelectElement>("vehicle");
   let selected = 0;
   let ids: number[] = [];
+  let newest: readonly Pose[] = [];
   let chosen: (vehicleId: number) => void = () => {};
 
   const select = (vehicleId: number) => {
@@ -83,6 +86,7 @@ export function makeShell(): Shell {
       scene?.setRun(run, index);
       if (index !== 0) return;
       plots.setRun(run);
+      newest = [];
       ids = run.vehicles.map(({ id }) => id);
       picker.replaceChildren(...ids.map((id) => make("option", { value: String(id) }, String(id))));
       find("vehicle-picker").hidden = ids.length < 2;
@@ -91,7 +95,26 @@ export function makeShell(): Shell {
     },
     setPoses(simTime, poses, index = 0) {
       scene?.setPoses(simTime, poses, index);
-      if (index === 0) table.offer(simTime, poses);
+      if (index !== 0) return;
+      newest = poses;
+      table.offer(simTime, poses);
+    },
+    expose(own) {
+      Object.assign(window, {
+        slsView: {
+          redraw: () => scene?.invalidate(),
+          frames: () => scene?.frames() ?? 0,
+          projection: (vehicleId: number) => scene?.projection(vehicleId) ?? null,
+          camera: () => scene?.camera() ?? null,
+          cable: (vehicleId: number) => scene?.cable(vehicleId) ?? null,
+          /** Of the newest step, frame W. */
+          pose: (vehicleId: number) => {
+            const pose = newest.find((candidate) => candidate.vehicleId === vehicleId);
+            return pose ? { quad: Array.from(pose.quad), load: Array.from(pose.load), attitude: Array.from(pose.attitude) } : null;
+          },
+          ...own,
+        },
+      });
     },
   };
 }

@@ -3,7 +3,7 @@ import { findLoad } from "../cables";
 import { find, make, setText } from "../dom";
 import { showBanner, showLines, showPhase, showRun, showStage, showTime } from "../panels";
 import { listKeys, makeShell, type Shell } from "../shell";
-import type { PageMode, Pose, RunIndex, Trail } from "../types";
+import type { PageMode, RunIndex, Trail } from "../types";
 import { findLargestDistance, formatMetres } from "./comparison";
 import { loadRecording } from "./load";
 import { Player } from "./player";
@@ -46,7 +46,6 @@ class Replay {
   private readonly apart: HTMLElement[] = [];
   private shownTime = NaN;
   private lastFrame = 0;
-  private poses: Pose[] = [];
 
   constructor(
     private readonly shell: Shell,
@@ -191,11 +190,7 @@ class Replay {
     const { time } = this.player;
     if (time !== this.shownTime) {
       this.shownTime = time;
-      this.recordings.forEach((recording, index) => {
-        const poses = recording.posesAt(time);
-        this.shell.setPoses(time, poses, index as RunIndex);
-        if (index === 0) this.poses = poses;
-      });
+      this.recordings.forEach((recording, index) => this.shell.setPoses(time, recording.posesAt(time), index as RunIndex));
       this.shell.plots.setCursor(time);
       this.showTexts(time);
     }
@@ -215,31 +210,19 @@ class Replay {
     this.apart.forEach((element, index) => setText(element, texts[index] ?? "–"));
   }
 
-  /** For tests. */
   private expose(): void {
-    const { scene } = this.shell;
-    Object.assign(window, {
-      slsView: {
-        projection: (vehicleId: number) => scene?.projection(vehicleId) ?? null,
-        camera: () => scene?.camera() ?? null,
-        cable: (vehicleId: number) => scene?.cable(vehicleId) ?? null,
-        frames: () => scene?.frames() ?? 0,
-        seek: (time: number) => {
-          this.player.pause();
-          this.player.seek(time);
-          this.jump();
-        },
-        state: () => ({
-          sim_time_s: this.player.time,
-          is_playing: this.player.isPlaying,
-          recordings: this.names,
-          has_scene: scene !== null,
-        }),
-        pose: (vehicleId: number) => {
-          const pose = this.poses.find((candidate) => candidate.vehicleId === vehicleId);
-          return pose ? { quad: Array.from(pose.quad), load: Array.from(pose.load), attitude: Array.from(pose.attitude) } : null;
-        },
+    this.shell.expose({
+      seek: (time: number) => {
+        this.player.pause();
+        this.player.seek(time);
+        this.jump();
       },
+      state: () => ({
+        sim_time_s: this.player.time,
+        is_playing: this.player.isPlaying,
+        recordings: this.names,
+        has_scene: this.shell.scene !== null,
+      }),
     });
   }
 }
