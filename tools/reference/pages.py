@@ -111,8 +111,7 @@ def to_rows(items):
 
 
 def describe_help(name, parsed, level):
-    text = f"\n{'#' * level} {name}\n\n{parsed.description}\n\n"
-    text += "".join(f"    {usage}\n" for usage in parsed.usage)
+    text = f"\n{'#' * level} {name}\n\n{parsed.description}\n\n    {parsed.usage}\n"
     if items := parsed.list_own():
         text += "\n" + make_table(["argument", "values", "default", "meaning"], to_rows(items))
     if parsed.subcommands:
