@@ -187,14 +187,15 @@ Topics, their types and their QoS, from `common/bus/topics.hpp`, `idl/sls.idl` a
     text += "\n## Enumerations\n"
     for name, values in enums.items():
         text += f"\n### {name}\n\n" + (comments[name] + "\n\n" if comments[name] else "")
-        text += make_table(["number", "value", "meaning"],
-                           [[str(number), f"`{value}`", comment] for number, (value, comment) in enumerate(values)])
+        if any(comment for _, comment in values):
+            text += make_table(["number", "value", "meaning"],
+                               [[str(number), f"`{value}`", comment] for number, (value, comment) in enumerate(values)])
+        else:
+            text += ", ".join(f"{number} `{value}`" for number, (value, _) in enumerate(values)) + "\n"
     return text
 
 
 def make_error_codes_page(_):
-    enums = sources.load_contract()[1]
-    structs = sources.load_contract()[0]
     text = "# Error codes\n\n" + NOTE + """
 ## Exit codes of every program and of ./sls
 
@@ -213,24 +214,15 @@ failed. Logs and recordings show the name.
     text += """
 ## Counters of a run
 
-The server counts these events in `counters` of `sls/status`; `status.csv` has a column for each.
+The server counts the events of [SyncCounters](topics.md#synccounters) in `counters` of `sls/status`; `status.csv` has a
+column for each.
 
-"""
-    text += make_table(["counter", "meaning"],
-                       [[f"`{field}`", comment] for _, field, comment in structs["SyncCounters"]])
-    text += """
 `stale` counts answers that reached the server. Fast DDS drops an expired answer earlier and without a count: then only
 `late` and `held` grow, as without a client. Its cause is the network, or a clock that is behind the server's.
 
 `rejected_not_finite` counts NaN and infinity in the force, the controller's numbers or the reference. A client that
 cannot compute an answer sends the error code `not_finite` instead.
-
-## Kinds of an entry in sls/record
-
 """
-    text += make_table(["number", "value", "meaning"],
-                       [[str(number), f"`{value}`", comment]
-                        for number, (value, comment) in enumerate(enums["AnswerKind"])])
     return text
 
 
