@@ -30,8 +30,8 @@ class Help:
     subcommands: list
 
     def list_own(self):
-        """Arguments and options but --help and --version."""
-        return self.positionals + [option for option in self.options if not {"--help", "--version"} & set(option.names)]
+        """Arguments and options but --help."""
+        return self.positionals + [option for option in self.options if "--help" not in option.names]
 
 
 def parse_item(spec, text):

@@ -123,7 +123,7 @@ def describe_help(name, parsed, level):
 def make_commands_page(build):
     text = "# Commands and options\n\n" + NOTE + """
 First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints. The tables leave out
-`--help` and `--version`, which every program has.
+`--help`, which every program has.
 [Exit codes](error-codes.md) are the same for all programs.
 
 ## ./sls
