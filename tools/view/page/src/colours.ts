@@ -17,22 +17,7 @@ export const kLoadColour = readColour("load");
 export const kReferenceColour = readColour("reference");
 
 /** Colours of the page that the theme gives: custom properties of style.css. */
-export interface Theme {
-  background: string;
-  grid: string;
-  gridMajor: string;
-  text: string;
-  muted: string;
-  accent: string;
-  frame: string;
-  outline: string;
-  plotGrid: string;
-  series: string[];
-  fault: string;
-  event: string;
-}
-
-export function readTheme(): Theme {
+export function readTheme() {
   return {
     background: readColour("scene"),
     grid: readColour("grid"),
@@ -48,6 +33,7 @@ export function readTheme(): Theme {
     event: readColour("muted"),
   };
 }
+export type Theme = ReturnType<typeof readTheme>;
 
 /** Calls `act` when the theme changes between dark and light. */
 export function onThemeChange(act: () => void): void {

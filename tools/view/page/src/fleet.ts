@@ -44,23 +44,28 @@ const kLeastBladePixels = 16;
 const kLeastLoadPixels = 4.5;
 
 /** Position and attitude of one vehicle, in scene coordinates. */
-export interface Body {
-  readonly vehicle: Vehicle;
+export class Body {
   readonly airframe: Airframe;
   readonly loadRadius: number;
-  readonly quad: Vector3;
-  /** Of the load, or of the end of the cable. */
-  readonly load: Vector3;
-  /** Of the load. */
-  readonly centre: Vector3;
-  readonly loadRotation: Quaternion;
   readonly hasLoad: boolean;
-  cable: Cable | null;
-  readonly reference: Vector3;
-  readonly rotation: Quaternion;
-  hasPose: boolean;
-  hasReference: boolean;
-  rotorRate: number;
+  readonly quad = new Vector3();
+  /** Of the load, or of the end of the cable. */
+  readonly load = new Vector3();
+  /** Of the load. */
+  readonly centre = new Vector3();
+  readonly loadRotation = new Quaternion();
+  readonly reference = new Vector3();
+  readonly rotation = new Quaternion();
+  cable: Cable | null = null;
+  hasPose = false;
+  hasReference = false;
+  rotorRate = NaN;
+
+  constructor(run: Run, readonly vehicle: Vehicle, place: number) {
+    this.airframe = makeAirframe(vehicle);
+    this.loadRadius = calcLoadRadius(run, vehicle);
+    this.hasLoad = hasLoad(run, place);
+  }
 }
 
 /** The same part of all vehicles: one mesh with `count` copies of the geometry, whose vertices look up the matrix of
@@ -149,22 +154,7 @@ export class Fleet {
     isMany: boolean,
     isCoarse: boolean,
   ) {
-    this.bodies = run.vehicles.map((vehicle, place) => ({
-      vehicle,
-      airframe: makeAirframe(vehicle),
-      loadRadius: calcLoadRadius(run, vehicle),
-      quad: new Vector3(),
-      load: new Vector3(),
-      centre: new Vector3(),
-      loadRotation: new Quaternion(),
-      hasLoad: hasLoad(run, place),
-      cable: null,
-      reference: new Vector3(),
-      rotation: new Quaternion(),
-      hasPose: false,
-      hasReference: false,
-      rotorRate: NaN,
-    }));
+    this.bodies = run.vehicles.map((vehicle, place) => new Body(run, vehicle, place));
     this.bodies.forEach((body, place) => this.places.set(body.vehicle.id, place));
     const opacity = index === 1 ? 0.38 : 1;
     const count = this.bodies.length;

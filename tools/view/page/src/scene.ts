@@ -26,13 +26,6 @@ interface Layer {
   isFitted: boolean;
 }
 
-export interface Projection {
-  /** CSS pixels of the page. */
-  quad: [number, number];
-  load: [number, number];
-  reference: [number, number] | null;
-}
-
 export class Scene {
   private canvas: HTMLCanvasElement;
   private readonly overlay: Overlay;
@@ -191,7 +184,8 @@ export class Scene {
     return this.frameTimes.filter((time) => time > since).length;
   }
 
-  projection(vehicleId: number): Projection | null {
+  /** Places of the vehicle's parts, in CSS pixels of the page. */
+  projection(vehicleId: number) {
     const body = this.body(vehicleId);
     if (!body?.hasPose) return null;
     this.view.update(); // the camera may have changed since the last frame

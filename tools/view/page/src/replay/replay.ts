@@ -4,7 +4,6 @@ import { find, make, setText } from "../dom";
 import { showBanner, showLines, showPhase, showRun, showStage, showTime } from "../panels";
 import { listKeys, makeShell, type Shell } from "../shell";
 import type { PageMode, RunIndex, Trail } from "../types";
-import { findLargestDistance, formatMetres } from "./comparison";
 import { loadRecording } from "./load";
 import { Player } from "./player";
 import { distance, findRow, type RecordedFault, type Recording } from "./recording";
@@ -13,6 +12,7 @@ import { formatTime, Timeline, type TimelineMark } from "./timeline";
 const kTrailSpacing = 0.04; // s of simulated time between two points
 const kMostTrailPoints = 1400;
 const kShortFlight = 60; // s that plots show at once
+const kMostSamples = 4000; // of a comparison
 
 const kKeys: [string, string][] = [
   ["Space", "play or pause"],
@@ -256,4 +256,25 @@ function makeTrail(recording: Recording, vehicleId: number, time: number): Trail
       : rows.values.subarray(at + loadAt, at + loadAt + 3)));
   }
   return { quad: quad!, load: load! };
+}
+
+/** Largest distance between the loads of one vehicle in two recordings, m, and when. */
+function findLargestDistance(a: Recording, b: Recording, vehicleId: number): { distance: number; time: number } {
+  const none = { distance: NaN, time: NaN };
+  const rows = a.rowsOf(vehicleId);
+  if (!rows || !b.rowsOf(vehicleId)) return none;
+  const stride = Math.max(1, Math.ceil(rows.time.length / kMostSamples));
+  let largest = none;
+  for (let i = 0; i < rows.time.length; i += stride) {
+    const time = rows.time[i]!;
+    if (time < b.from || time > b.to) continue;
+    const apart = distance(a.poseAt(vehicleId, time).load, b.poseAt(vehicleId, time).load);
+    if (!(apart <= largest.distance)) largest = { distance: apart, time };
+  }
+  return largest;
+}
+
+/** "0.0123 m", or "–" where there is none. */
+function formatMetres(length: number): string {
+  return Number.isFinite(length) ? `${length.toPrecision(3)} m` : "–";
 }
