@@ -1,18 +1,15 @@
 #include "tools/doctor/listening_post.hpp"
 
+#include <limits>
+
 #include "common/config/domain.hpp"
 
 namespace sls::doctor {
-namespace {
-
-constexpr int kMaxPort = 65535;
-
-}  // namespace
 
 ListeningPost::ListeningPost(Ports ports) {
   const auto interfaces = find_interfaces();
   for (ports.domain = 0; ports.domain <= config::kMaxDomain; ++ports.domain) {
-    if (ports.multicast() > kMaxPort) break;
+    if (ports.multicast() > std::numeric_limits<std::uint16_t>::max()) break;
     UdpSocket socket;
     if (!socket.bind(kMulticastGroup, ports.multicast(), true)) continue;  // the port is not shared
     // One socket is enough: the kernel delivers a joined group to all sockets (IP_MULTICAST_ALL).
