@@ -75,7 +75,7 @@ def make_launcher(page, version, names):
                       usage.removeprefix("./"))
     text += ".SH DESCRIPTION\n.nf\n" + escape(re.sub(r"\n\n+", "\n.sp\n", overview)).replace("\\&.sp", ".sp")
     text += "\n.fi\n.SH COMMANDS\n"
-    for command in sources.list_commands():
+    for command in sources.COMMANDS:
         block = pages.find_block(page, command)
         link = re.search(rf"^### \./sls {command}\n\nIt starts `(\w+)`", page, re.MULTILINE)
         if block:

@@ -8,13 +8,9 @@ NOTE = ("<!-- Generated from the code's own tables by ./sls reference; changes h
         "tests/docs/reference_test.py compares. -->\n")
 
 
-def escape(text):
-    return text.replace("|", "\\|")
-
-
 def make_table(head, rows):
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
-    lines += ["| " + " | ".join(escape(cell) for cell in row) + " |" for row in rows]
+    lines += ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
     return "\n".join(lines) + "\n"
 
 

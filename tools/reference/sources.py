@@ -70,11 +70,6 @@ def read_version(build):
 # --- the launcher ---------------------------------------------------------------------------------
 
 
-def list_commands():
-    """The commands of ./sls."""
-    return list(COMMANDS)
-
-
 def read_launcher(build):
     """{"": the text of ./sls help, command: that of ./sls COMMAND --help}."""
     environment = dict(os.environ, SLS_BUILD=str(build), COLUMNS="100", LC_ALL="C.UTF-8")
@@ -85,7 +80,7 @@ def read_launcher(build):
         text = re.sub(r"=\S*/config/qos/", "=config/qos/", text)
         return re.sub(r"([Uu]sage: )(?!\./sls\b)\S*/", r"\1", text).rstrip()
 
-    return {"": ask("help")} | {name: ask(name, "--help") for name in list_commands() if name != "help"}
+    return {"": ask("help")} | {name: ask(name, "--help") for name in COMMANDS if name != "help"}
 
 
 # --- scenario -------------------------------------------------------------------------------------
