@@ -3,6 +3,7 @@ import {
   BackSide,
   BufferAttribute,
   BufferGeometry,
+  CircleGeometry,
   Color,
   DataTexture,
   DoubleSide,
@@ -24,12 +25,10 @@ import {
   makeAirframe,
   makeBallGeometry,
   makeBladeGeometry,
-  makeDiscGeometry,
   makeFrameGeometry,
   makeLoadGeometry,
   makeReticleGeometry,
   makeRodGeometry,
-  makeShadowGeometry,
   paint,
   type Airframe,
 } from "./parts";
@@ -131,7 +130,6 @@ function repeat(geometry: BufferGeometry, count: number): BufferGeometry {
 export class Fleet {
   readonly group = new Group();
   readonly bodies: Body[];
-  private readonly places = new Map<number, number>();
   private readonly frames: { part: Part; outline: Part; members: number[] }[] = [];
   private readonly discs: Part;
   private readonly blades: Part;
@@ -155,12 +153,11 @@ export class Fleet {
     isCoarse: boolean,
   ) {
     this.bodies = run.vehicles.map((vehicle, place) => new Body(run, vehicle, place));
-    this.bodies.forEach((body, place) => this.places.set(body.vehicle.id, place));
     const opacity = index === 1 ? 0.38 : 1;
     const count = this.bodies.length;
     const rotors = this.bodies.reduce((sum, { airframe }) => sum + airframe.rotors.length, 0);
 
-    this.shadows = this.add(makeShadowGeometry(isCoarse), count, 1, { colour: "outline", opacity: 0.22 * opacity });
+    this.shadows = this.add(new CircleGeometry(1, isCoarse ? 8 : 20), count, 1, { colour: "outline", opacity: 0.22 * opacity });
     for (const members of this.groupByAirframe().values()) {
       const { airframe } = this.bodies[members[0]!]!;
       const geometry = makeFrameGeometry(airframe, isCoarse);
@@ -178,7 +175,7 @@ export class Fleet {
     for (const { mesh } of [this.shadows, this.outlines]) mesh.visible = !isCoarse;
     this.loads = this.add(makeBallGeometry(isCoarse), count, 4, { fixed: kLoadColour, opacity });
     this.blades = this.add(makeBladeGeometry(), rotors, 5, { colour: "frame", side: DoubleSide, opacity: 0.85 * opacity });
-    this.discs = this.add(makeDiscGeometry(isCoarse), rotors, 6, {
+    this.discs = this.add(new CircleGeometry(1, isCoarse ? 9 : 24), rotors, 6, {
       colour: "frame",
       side: DoubleSide,
       opacity: (isMany ? 0.3 : 0.16) * opacity,
@@ -189,8 +186,7 @@ export class Fleet {
   }
 
   find(vehicleId: number): Body | undefined {
-    const place = this.places.get(vehicleId);
-    return place === undefined ? undefined : this.bodies[place];
+    return this.bodies.find(({ vehicle }) => vehicle.id === vehicleId);
   }
 
   setTheme(theme: Theme): void {

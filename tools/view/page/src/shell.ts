@@ -63,7 +63,8 @@ export function makeShell(): Shell {
   scene?.onPick(choose);
   table.onPick(choose);
   picker.addEventListener("change", () => choose(Number(picker.value)));
-  setUpCameras(scene);
+  makeChoice(find("cameras"), ({ dataset }) => scene?.setCamera(dataset.camera as CameraMode));
+  find("fit").addEventListener("click", () => scene?.fit());
   makeChoice(find("windows"), ({ dataset }) => plots.setWindow(dataset.window === "all" ? null : Number(dataset.window)));
   document.addEventListener("keydown", (event) => {
     if (isTyping(event) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -128,11 +129,6 @@ function makeScene(): Scene | null {
     document.querySelector<HTMLElement>(".key-list")!.hidden = true;
     return null;
   }
-}
-
-function setUpCameras(scene: Scene | null): void {
-  makeChoice(find("cameras"), ({ dataset }) => scene?.setCamera(dataset.camera as CameraMode));
-  find("fit").addEventListener("click", () => scene?.fit());
 }
 
 function setUpTheme(): void {
