@@ -29,8 +29,7 @@ export function readTheme() {
     outline: readColour("outline"),
     plotGrid: readColour("plot-grid"),
     series: [1, 2, 3, 4, 5, 6, 7, 8].map((index) => readColour(`series-${index}`)),
-    fault: readColour("fault"),
-    event: readColour("muted"),
+    bad: readColour("bad"),
   };
 }
 export type Theme = ReturnType<typeof readTheme>;

@@ -255,7 +255,7 @@ export class Plots {
     context.save();
     context.lineWidth = ratio;
     for (const mark of this.marks)
-      line(mark.time, mark.kind === "fault" ? this.theme.fault : this.theme.event, mark.kind === "fault" ? [] : [3 * ratio, 3 * ratio]);
+      line(mark.time, mark.kind === "fault" ? this.theme.bad : this.theme.muted, mark.kind === "fault" ? [] : [3 * ratio, 3 * ratio]);
     context.lineWidth = 1.5 * ratio;
     if (this.cursor !== null) line(this.cursor, this.theme.accent, []);
     context.restore();

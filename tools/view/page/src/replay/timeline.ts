@@ -21,12 +21,12 @@ export interface TimelineOptions {
 
 export class Timeline {
   private readonly slider: HTMLInputElement;
-  private readonly playButton: HTMLButtonElement;
-  private readonly speed: HTMLSelectElement;
-  private readonly loop: HTMLInputElement;
-  private readonly label: HTMLElement;
-  private readonly stage: HTMLElement;
-  private readonly band: HTMLElement;
+  private readonly playButton = make("button", { type: "button", class: "timeline-play primary" });
+  private readonly speed = make("select");
+  private readonly loop = make("input", { type: "checkbox" });
+  private readonly label = make("output", { class: "timeline-time", "aria-live": "off" });
+  private readonly stage = make("span", { class: "timeline-now" });
+  private readonly band = make("div", { class: "timeline-band", "aria-hidden": "true" });
   private marks: TimelineMark[] = [];
 
   constructor(
@@ -35,25 +35,19 @@ export class Timeline {
   ) {
     const { player } = options;
     element.classList.add("timeline");
-    this.playButton = make("button", { type: "button", class: "timeline-play primary" });
     this.playButton.addEventListener("click", () => this.toggle());
     this.slider = make("input", {
       type: "range", class: "timeline-slider", id: "time", "aria-label": "Simulated time",
       min: `${player.from}`, max: `${player.to}`, step: "any",
     });
     this.slider.addEventListener("input", () => this.seek(Number(this.slider.value)));
-    this.band = make("div", { class: "timeline-band", "aria-hidden": "true" });
     const track = make("div", { class: "timeline-track" }, this.band, this.slider);
 
-    this.label = make("output", { class: "timeline-time", "aria-live": "off" });
-    this.stage = make("span", { class: "timeline-now" });
-    this.speed = make("select");
     this.speed.append(...kSpeeds.map((speed) => new Option(`${speed}×`, `${speed}`, speed === 1, speed === 1)));
     this.speed.addEventListener("change", () => {
       player.setSpeed(Number(this.speed.value));
       this.update();
     });
-    this.loop = make("input", { type: "checkbox" });
     this.loop.addEventListener("change", () => (player.loops = this.loop.checked));
     const controls = make("div", { class: "timeline-controls" }, this.playButton, this.label, this.stage,
       make("label", {}, "Speed ", this.speed), make("label", {}, "Loop ", this.loop));
