@@ -8,13 +8,9 @@ NOTE = ("<!-- Generated from the code's own tables by ./sls reference; changes h
         "tests/docs/reference_test.py compares. -->\n")
 
 
-def escape(text):
-    return text.replace("|", "\\|")
-
-
 def make_table(head, rows):
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
-    lines += ["| " + " | ".join(escape(cell) for cell in row) + " |" for row in rows]
+    lines += ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
     return "\n".join(lines) + "\n"
 
 
@@ -111,17 +107,19 @@ def to_rows(items):
 
 
 def describe_help(name, parsed, level):
-    text = f"\n{'#' * level} {name}\n\n{parsed.description}\n\n"
-    text += "".join(f"    {usage}\n" for usage in parsed.usage)
-    items = parsed.positionals + parsed.options
-    if items:
+    text = f"\n{'#' * level} {name}\n\n{parsed.description}\n\n    {parsed.usage}\n"
+    if items := parsed.list_own():
         text += "\n" + make_table(["argument", "values", "default", "meaning"], to_rows(items))
+    if parsed.subcommands:
+        text += "\n" + make_table(["command", "meaning"],
+                                  [[f"`{item.spell()}`", item.text] for item in parsed.subcommands])
     return text
 
 
 def make_commands_page(build):
     text = "# Commands and options\n\n" + NOTE + """
-First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints.
+First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints. The tables leave out
+`--help`, which every program has.
 [Exit codes](error-codes.md) are the same for all programs.
 
 ## ./sls
@@ -141,7 +139,8 @@ First the commands of `./sls`, then the programs that they start. Each text is w
     for name, (parsed, subcommands) in programs.items():
         text += describe_help(name, parsed, 2)
         for subcommand, its_help in subcommands.items():
-            text += describe_help(f"{name} {subcommand}", its_help, 3)
+            if its_help.list_own():
+                text += describe_help(f"{name} {subcommand}", its_help, 3)
     return text
 
 
@@ -184,14 +183,15 @@ Topics, their types and their QoS, from `common/bus/topics.hpp`, `idl/sls.idl` a
     text += "\n## Enumerations\n"
     for name, values in enums.items():
         text += f"\n### {name}\n\n" + (comments[name] + "\n\n" if comments[name] else "")
-        text += make_table(["number", "value", "meaning"],
-                           [[str(number), f"`{value}`", comment] for number, (value, comment) in enumerate(values)])
+        if any(comment for _, comment in values):
+            text += make_table(["number", "value", "meaning"],
+                               [[str(number), f"`{value}`", comment] for number, (value, comment) in enumerate(values)])
+        else:
+            text += ", ".join(f"{number} `{value}`" for number, (value, _) in enumerate(values)) + "\n"
     return text
 
 
 def make_error_codes_page(_):
-    enums = sources.load_contract()[1]
-    structs = sources.load_contract()[0]
     text = "# Error codes\n\n" + NOTE + """
 ## Exit codes of every program and of ./sls
 
@@ -210,24 +210,15 @@ failed. Logs and recordings show the name.
     text += """
 ## Counters of a run
 
-The server counts these events in `counters` of `sls/status`; `status.csv` has a column for each.
+The server counts the events of [SyncCounters](topics.md#synccounters) in `counters` of `sls/status`; `status.csv` has a
+column for each.
 
-"""
-    text += make_table(["counter", "meaning"],
-                       [[f"`{field}`", comment] for _, field, comment in structs["SyncCounters"]])
-    text += """
 `stale` counts answers that reached the server. Fast DDS drops an expired answer earlier and without a count: then only
 `late` and `held` grow, as without a client. Its cause is the network, or a clock that is behind the server's.
 
 `rejected_not_finite` counts NaN and infinity in the force, the controller's numbers or the reference. A client that
 cannot compute an answer sends the error code `not_finite` instead.
-
-## Kinds of an entry in sls/record
-
 """
-    text += make_table(["number", "value", "meaning"],
-                       [[str(number), f"`{value}`", comment]
-                        for number, (value, comment) in enumerate(enums["AnswerKind"])])
     return text
 
 

@@ -70,10 +70,9 @@ class FoxgloveSessionTest : public ::testing::Test {
     return 0;
   }
 
-  test::FakeFlight* flight = new test::FakeFlight;  // owned by `hub`
+  const std::unique_ptr<test::FakeFlight> flight = std::make_unique<test::FakeFlight>();
   std::chrono::steady_clock::time_point now{1h};
-  std::shared_ptr<Hub> hub =
-      std::make_shared<Hub>(std::unique_ptr<FlightSource>(flight), [this] { return now; });
+  std::shared_ptr<Hub> hub = std::make_shared<Hub>(*flight, *flight, [this] { return now; });
   test::FakeConnection connection;
   std::unique_ptr<FoxgloveSession> session;
 };
@@ -228,7 +227,7 @@ TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertis
 TEST_F(FoxgloveSessionTest, EventsAndSilenceAreReportedInWords) {
   flight->begin_run(kRun, {0});
   connect();
-  hub->note_event(kRun, 250, "controller pilot took over");
+  hub->note_event({kRun, 250, "controller pilot took over"});
   EXPECT_EQ(connection.find_statuses(0).back(), "1.000 s: controller pilot took over");
   flight->run->is_silent = true;
   flight->run->silence_s = 2.3;
