@@ -110,38 +110,45 @@ def to_rows(items):
     return rows
 
 
+def list_own_items(parsed):
+    """Arguments and options but those of every program."""
+    return [item for item in parsed.positionals + parsed.options if item.names[-1] not in ("--help", "--version")]
+
+
 def describe_help(name, parsed, level):
     text = f"\n{'#' * level} {name}\n\n{parsed.description}\n\n"
     text += "".join(f"    {usage}\n" for usage in parsed.usage)
-    items = parsed.positionals + parsed.options
-    if items:
+    if items := list_own_items(parsed):
         text += "\n" + make_table(["argument", "values", "default", "meaning"], to_rows(items))
     return text
 
 
 def make_commands_page(build):
     text = "# Commands and options\n\n" + NOTE + """
-First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints.
-[Exit codes](error-codes.md) are the same for all programs.
+First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints. Every command has
+`--help`, every program `--help` and `--version`. [Exit codes](error-codes.md) are the same for all programs.
 
 ## ./sls
 """
     launcher = sources.read_launcher(build)
     programs = sources.load_programs(build)
     helps = {sources.read_help(build, name).rstrip(): name for name in programs}
-    text += "\n" + to_block(launcher[""])
+    text += "\n" + to_block(launcher.pop("")) + "\nThese commands start a program with the same options:\n\n"
+    text += make_table(["command", "program"], [[f"`./sls {command}`", f"[{helps[block]}](#{helps[block]})"]
+                                                for command, block in launcher.items() if block in helps])
     for command, block in launcher.items():
-        if not command:
-            continue
-        text += f"\n### ./sls {command}\n\n"
-        if block in helps:
-            text += f"It starts `{helps[block]}` with the same options: [{helps[block]}](#{helps[block]}).\n"
-        else:
-            text += to_block(block)
+        if block not in helps:
+            text += f"\n### ./sls {command}\n\n" + to_block(block)
     for name, (parsed, subcommands) in programs.items():
         text += describe_help(name, parsed, 2)
+        if subcommands:
+            text += "\n" + make_table(["subcommand", "meaning"], [
+                [f"`{its_help.usage[0].replace(' [OPTIONS]', '')}`", "; ".join([its_help.description] + [
+                    f"{item.names[0]}: {item.text}" for item in its_help.positionals])]
+                for its_help in subcommands.values()])
         for subcommand, its_help in subcommands.items():
-            text += describe_help(f"{name} {subcommand}", its_help, 3)
+            if any(item.is_option for item in list_own_items(its_help)):
+                text += describe_help(f"{name} {subcommand}", its_help, 3)
     return text
 
 
@@ -154,6 +161,12 @@ def find_block(page, command):
     heading = re.escape(f"### ./sls {command}" if command else "## ./sls")
     match = re.search(rf"^{heading}\n\n```text\n(.*?)\n```$", page, re.MULTILINE | re.DOTALL)
     return match[1] if match else ""
+
+
+def find_program(page, command):
+    """The program that a command starts with the same options; None if it has options of its own."""
+    match = re.search(rf"^\| `\./sls {re.escape(command)}` \| \[(\w+)\]", page, re.MULTILINE)
+    return match[1] if match else None
 
 
 def make_topics_page(_):
