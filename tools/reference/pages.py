@@ -72,6 +72,8 @@ Every key of a scenario file. [common/config](../../common/config/README.md) des
 """
     sections = {}
     for key in sources.load_keys(build):
+        if key["default_words"] == "as in `plant.rotor`":
+            continue  # the meaning of `plant.rotors` says it for all
         section = sections.setdefault(re.split(r"[.\[]", key["path"])[0], {})
         # Keys of a model have a table of their own; the meaning of other conditional keys ends with their condition.
         condition = to_condition(key) if key["condition"] else ""
@@ -153,7 +155,8 @@ First the commands of `./sls`, then the programs that they start. Each text is w
 
 
 def to_block(text):
-    return "```text\n" + text.rstrip() + "\n```\n"
+    """The text without its line of --help."""
+    return "```text\n" + re.sub(r"^  -h, ?--help .*\n", "", text, flags=re.MULTILINE).rstrip() + "\n```\n"
 
 
 def find_block(page, command):
