@@ -60,6 +60,14 @@ def to_condition(key):
     return f"With `{name}`: " + (", ".join(values[:-1]) + " or " if values[1:] else "") + values[-1]
 
 
+def merge_alike(rows):
+    """Rows of keys with one name, such as those that all faults have, as one row."""
+    merged = {}
+    for path, *cells in rows:
+        merged.setdefault((path.rpartition(".")[2], *cells), []).append(path)
+    return [[", ".join(f"`{path}`" for path in paths), *cells] for (_, *cells), paths in merged.items()]
+
+
 def make_scenario_page(build):
     text = "# Scenario keys\n\n" + NOTE + """
 Every key of a scenario file. [common/config](../../common/config/README.md) describes how the file is read, and fleets.
@@ -80,12 +88,12 @@ Every key of a scenario file. [common/config](../../common/config/README.md) des
         own_table = condition if key["condition"].startswith(("model", "law")) else ""
         meaning = key["meaning"] + (f" {condition}." if condition and not own_table else "")
         section.setdefault(own_table, []).append(
-            [f"`{key['path']}`", to_type(key), key["unit"], to_range(key), to_default(key), meaning])
+            [key["path"], to_type(key), key["unit"], to_range(key), to_default(key), meaning])
     for name, tables in sections.items():
         text += f"\n## {name}\n"
         for condition, rows in tables.items():
             text += f"\n### {condition}\n" if condition else ""
-            text += "\n" + make_table(["key", "type", "unit", "range", "default", "meaning"], rows)
+            text += "\n" + make_table(["key", "type", "unit", "range", "default", "meaning"], merge_alike(rows))
     return text
 
 
