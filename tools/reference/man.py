@@ -83,8 +83,10 @@ def make_launcher(page, version, names):
         if block:
             text += f".SS {escape(command)}\n.nf\n"
             text += escape(re.sub(r"\n\n+", "\n.sp\n", block)).replace("\\&.sp", ".sp") + "\n.fi\n"
-        elif program := pages.find_program(page, command):
-            text += f".SS {escape(command)}\nStarts\n.BR {escape(program)} (1)\nwith the same options.\n"
+        elif row := pages.find_row(page, command):
+            program = re.match(r"\[(\w+)\]", row)
+            meaning = f"Starts\n.BR {escape(program[1])} (1)\nwith the same options." if program else escape(row)
+            text += f".SS {escape(command)}\n{meaning}\n"
     return text + make_end("sls", names)
 
 

@@ -146,8 +146,12 @@ First the commands of `./sls`, then the programs that they start. Each text is w
     text += "\n" + to_block(launcher.pop("")) + "\nThese commands start a program with the same options:\n\n"
     text += make_table(["command", "program"], [[f"`./sls {command}`", f"[{helps[block]}](#{helps[block]})"]
                                                 for command, block in launcher.items() if block in helps])
+    plain = {command: found[1].replace("\n", " ") for command, block in launcher.items()
+             if (found := re.fullmatch(rf"usage: \./sls {command}\n\n((?:.+\n?)+)", block))}
+    text += "\nThese have no options:\n\n" + make_table(["command", "meaning"], [
+        [f"`./sls {command}`", meaning] for command, meaning in plain.items()])
     for command, block in launcher.items():
-        if block not in helps:
+        if block not in helps and command not in plain:
             text += f"\n### ./sls {command}\n\n" + to_block(block)
     for name, (parsed, subcommands) in programs.items():
         text += describe_help(name, parsed, 2)
@@ -174,10 +178,10 @@ def find_block(page, command):
     return match[1] if match else ""
 
 
-def find_program(page, command):
-    """The program that a command starts with the same options; None if it has options of its own."""
-    match = re.search(rf"^\| `\./sls {re.escape(command)}` \| \[(\w+)\]", page, re.MULTILINE)
-    return match[1] if match else None
+def find_row(page, command):
+    """What the tables say of a command without a block: a link to the program that it starts, or its meaning."""
+    match = re.search(rf"^\| `\./sls {re.escape(command)}` \| (.*) \|$", page, re.MULTILINE)
+    return match[1] if match else ""
 
 
 def make_topics_page(_):

@@ -33,7 +33,7 @@ def read_options(command: str) -> dict[str, tuple[str, str]]:
     section = re.sub(r"\n {4,}(?=[^\s-])", "  ", section)  # lines that go on
     found = {name: (argument, " ".join((cells or meaning).split()))
              for name, argument, cells, meaning in OPTION.findall(section)}
-    return common | found if section else {}
+    return common | found if section or f"\n| `./sls {command}` |" in page else {}
 
 
 def list_values(argument: str, meaning: str) -> list[str]:
