@@ -142,9 +142,9 @@ def make_lap_table(flights: dict[str, Trajectory]) -> str:
         measure(flights["gazebo_legacy"], "`gazebo_legacy`: published wiring"),
         measure(shift_to_published(flights["gazebo_legacy"], "gazebo_legacy"), "`gazebo_legacy`, about z −0.5"),
         measure(flights["gazebo_correct_wiring"],
-                      "`gazebo_correct_wiring`: only the wiring put right"),
+                      "`gazebo_correct_wiring`: only the wiring corrected"),
         measure(flights["gazebo_corrected"],
-                      "`gazebo_corrected`: and the controller's model"),
+                      "`gazebo_corrected`: wiring and controller model corrected"),
     ]
     rows = [[f"published: {row[0]}", *row[1:]] for row in PUBLISHED_LAP_2[1:]]
     return make_markdown_table(LAP_HEADER, [*rows, *map(make_lap_row, ours)])

@@ -107,7 +107,7 @@ class PredictionTest(unittest.TestCase):
 
     def test_the_right_mass_is_the_formula_of_the_readme(self):
         gains = predictions.calc_lqr_gains(10, 4)
-        # closed_loop/README.md: 0.234 s, minus half a period for the hold.
+        # Linear theory (docs/campaigns.md): 0.234 s, minus half a period for the hold.
         self.assertAlmostEqual(predictions.calc_delay_limit(gains), 0.232, delta=5e-4)
         np.testing.assert_allclose(gains, [3.1623, 8.4827, 9.7962, 5.4399], atol=5e-5)
 

@@ -77,12 +77,13 @@ def make_launcher(page, version, names):
     text += "\n.fi\n.SH COMMANDS\n"
     for command in sources.COMMANDS:
         block = pages.find_block(page, command)
-        link = re.search(rf"^### \./sls {command}\n\nIt starts `(\w+)`", page, re.MULTILINE)
         if block:
             text += f".SS {escape(command)}\n.nf\n"
             text += escape(re.sub(r"\n\n+", "\n.sp\n", block)).replace("\\&.sp", ".sp") + "\n.fi\n"
-        elif link:
-            text += f".SS {escape(command)}\nStarts\n.BR {escape(link[1])} (1)\nwith the same options.\n"
+        elif row := pages.find_row(page, command):
+            program = re.match(r"\[(\w+)\]", row)
+            meaning = f"Starts\n.BR {escape(program[1])} (1)\nwith the same options." if program else escape(row)
+            text += f".SS {escape(command)}\n{meaning}\n"
     return text + make_end("sls", names)
 
 

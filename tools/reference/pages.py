@@ -56,6 +56,14 @@ def to_condition(key):
     return f"With `{name}`: " + (", ".join(values[:-1]) + " or " if values[1:] else "") + values[-1]
 
 
+def merge_alike(rows):
+    """Rows of keys with one name, such as those that all faults have, as one row."""
+    merged = {}
+    for path, *cells in rows:
+        merged.setdefault((path.rpartition(".")[2], *cells), []).append(path)
+    return [[", ".join(f"`{path}`" for path in paths), *cells] for (_, *cells), paths in merged.items()]
+
+
 def make_scenario_page(build):
     text = "# Scenario keys\n\n" + NOTE + """
 Every key of a scenario file. [common/config](../../common/config/README.md) describes how the file is read, and fleets.
@@ -68,18 +76,20 @@ Every key of a scenario file. [common/config](../../common/config/README.md) des
 """
     sections = {}
     for key in sources.load_keys(build):
+        if key["default_words"] == "as in `plant.rotor`":
+            continue  # the meaning of `plant.rotors` says it for all
         section = sections.setdefault(re.split(r"[.\[]", key["path"])[0], {})
         # Keys of a model have a table of their own; the meaning of other conditional keys ends with their condition.
         condition = to_condition(key) if key["condition"] else ""
         own_table = condition if key["condition"].startswith(("model", "law")) else ""
         meaning = key["meaning"] + (f" {condition}." if condition and not own_table else "")
         section.setdefault(own_table, []).append(
-            [f"`{key['path']}`", to_type(key), key["unit"], to_range(key), to_default(key), meaning])
+            [key["path"], to_type(key), key["unit"], to_range(key), to_default(key), meaning])
     for name, tables in sections.items():
         text += f"\n## {name}\n"
         for condition, rows in tables.items():
             text += f"\n### {condition}\n" if condition else ""
-            text += "\n" + make_table(["key", "type", "unit", "range", "default", "meaning"], rows)
+            text += "\n" + make_table(["key", "type", "unit", "range", "default", "meaning"], merge_alike(rows))
     return text
 
 
@@ -110,48 +120,57 @@ def describe_help(name, parsed, level):
     text = f"\n{'#' * level} {name}\n\n{parsed.description}\n\n    {parsed.usage}\n"
     if items := parsed.list_own():
         text += "\n" + make_table(["argument", "values", "default", "meaning"], to_rows(items))
-    if parsed.subcommands:
-        text += "\n" + make_table(["command", "meaning"],
-                                  [[f"`{item.spell()}`", item.text] for item in parsed.subcommands])
     return text
 
 
 def make_commands_page(build):
     text = "# Commands and options\n\n" + NOTE + """
-First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints. The tables leave out
-`--help`, which every program has.
-[Exit codes](error-codes.md) are the same for all programs.
+First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints. Every command has
+`--help`, every program `--help` and `--version`. [Exit codes](error-codes.md) are the same for all programs.
 
 ## ./sls
 """
     launcher = sources.read_launcher(build)
     programs = sources.load_programs(build)
     helps = {sources.read_help(build, name).rstrip(): name for name in programs}
-    text += "\n" + to_block(launcher[""])
+    text += "\n" + to_block(launcher.pop("")) + "\nThese commands start a program with the same options:\n\n"
+    text += make_table(["command", "program"], [[f"`./sls {command}`", f"[{helps[block]}](#{helps[block]})"]
+                                                for command, block in launcher.items() if block in helps])
+    plain = {command: found[1].replace("\n", " ") for command, block in launcher.items()
+             if (found := re.fullmatch(rf"usage: \./sls {command}\n\n((?:.+\n?)+)", block))}
+    text += "\nThese have no options:\n\n" + make_table(["command", "meaning"], [
+        [f"`./sls {command}`", meaning] for command, meaning in plain.items()])
     for command, block in launcher.items():
-        if not command:
-            continue
-        text += f"\n### ./sls {command}\n\n"
-        if block in helps:
-            text += f"It starts `{helps[block]}` with the same options: [{helps[block]}](#{helps[block]}).\n"
-        else:
-            text += to_block(block)
+        if block not in helps and command not in plain:
+            text += f"\n### ./sls {command}\n\n" + to_block(block)
     for name, (parsed, subcommands) in programs.items():
         text += describe_help(name, parsed, 2)
+        if subcommands:
+            text += "\n" + make_table(["subcommand", "meaning"], [
+                [f"`{its_help.usage.replace(' [OPTIONS]', '')}`", "; ".join([its_help.description] + [
+                    f"{item.names[0]}: {item.text}" for item in its_help.positionals])]
+                for its_help in subcommands.values()])
         for subcommand, its_help in subcommands.items():
-            if its_help.list_own():
+            if any(item.is_option for item in its_help.list_own()):
                 text += describe_help(f"{name} {subcommand}", its_help, 3)
     return text
 
 
 def to_block(text):
-    return "```text\n" + text.rstrip() + "\n```\n"
+    """The text without its line of --help."""
+    return "```text\n" + re.sub(r"^  -h, ?--help .*\n", "", text, flags=re.MULTILINE).rstrip() + "\n```\n"
 
 
 def find_block(page, command):
     """The text of a command in docs/reference/commands.md; for "" the text of ./sls help."""
     heading = re.escape(f"### ./sls {command}" if command else "## ./sls")
     match = re.search(rf"^{heading}\n\n```text\n(.*?)\n```$", page, re.MULTILINE | re.DOTALL)
+    return match[1] if match else ""
+
+
+def find_row(page, command):
+    """What the tables say of a command without a block: a link to the program that it starts, or its meaning."""
+    match = re.search(rf"^\| `\./sls {re.escape(command)}` \| (.*) \|$", page, re.MULTILINE)
     return match[1] if match else ""
 
 

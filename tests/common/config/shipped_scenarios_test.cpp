@@ -1,4 +1,4 @@
-// The shipped scenarios have the values of the project's design, section 7. The values are repeated
+// The shipped scenarios have the values of the published flights. They are repeated
 // here: a change of a scenario alone fails the test. The certificates of config/checks judge
 // figure_eight and short.
 #include <gtest/gtest.h>
