@@ -149,6 +149,7 @@ TEST_F(ServerTest, RefusesBodies) {
   EXPECT_EQ(find_status(get("/", "Transfer-Encoding: chunked\r\n") + "5\r\nhello\r\n0\r\n\r\n"),
             413);
   EXPECT_EQ(find_status(get("/", "Content-Length: 18446744073709551615\r\n")), 413);
+  EXPECT_EQ(find_status("POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1\r\n\r\nx"), 413);
   EXPECT_EQ(ask(get("/", "Content-Length: 0\r\n")).second, "the page");
 }
 
