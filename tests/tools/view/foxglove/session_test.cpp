@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "tests/support/text.hpp"
 #include "tests/tools/view/foxglove/fakes.hpp"
 
@@ -188,6 +190,22 @@ TEST_F(FoxgloveSessionTest, MirrorsComeAtMost100TimesASecondForEachVehicle) {
   }
 }
 
+TEST_F(FoxgloveSessionTest, EveryVehicleOfAFleetOf100IsMirrored) {
+  std::vector<std::uint32_t> ids(100);
+  std::iota(ids.begin(), ids.end(), 0u);
+  flight->begin_run(kRun, ids);
+  connect();
+  for (const std::uint32_t id : ids)
+    subscribe(id, find_channel("/sls/vehicle_" + std::to_string(id) + "/load/pose"));
+  for (std::size_t first = 0; first < ids.size(); first += 20)  // a step is spread over batches
+    flight->publish(TopicId::kRecord,
+                    make_batch(1, 1, {ids.begin() + first, ids.begin() + first + 20}));
+  std::vector<std::uint64_t> seen;
+  for (const std::string& message : connection.find(kMessageData))
+    seen.push_back(test::read_number(message, 1, 4));
+  EXPECT_EQ(seen, std::vector<std::uint64_t>(ids.begin(), ids.end()));
+}
+
 TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertised) {
   flight->begin_run(kRun, {0, 1});
   connect();
@@ -217,6 +235,9 @@ TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertis
     EXPECT_TRUE(holds(topic, "vehicle_1")) << topic;
     EXPECT_EQ(come.count(sls::test::replace_once(topic, "vehicle_1", "vehicle_2")), 1U) << topic;
   }
+  // Other subscriptions stay.
+  flight->publish(TopicId::kState, make_states(1, kRun + 1));
+  EXPECT_FALSE(connection.find(kMessageData).empty());
   // The client may end subscriptions that have ended already: that is no error of the client.
   Json ids = Json::array();
   for (std::uint32_t i = 0; i < id; ++i) ids.push_back(i);
@@ -413,6 +434,7 @@ INSTANTIATE_TEST_SUITE_P(
         BadText{"UnknownOp", R"({"op":"dance"})", "got 'dance'"},
         BadText{"ClientPublish", R"({"op":"advertise","channels":[]})", "clientPublish"},
         BadText{"Parameters", R"({"op":"setParameters"})", "capability parameters"},
+        BadText{"GetParameters", R"({"op":"getParameters"})", "capability parameters"},
         BadText{"Graph", R"({"op":"subscribeConnectionGraph"})", "connectionGraph"},
         BadText{"Assets", R"({"op":"fetchAsset","uri":"file:///etc/passwd"})", "assets"},
         BadText{"NoSubscriptions", R"({"op":"subscribe"})", "expected an array"},
