@@ -16,10 +16,8 @@
 namespace sls::view {
 namespace {
 
-using test::Frame;
 using test::kBinary;
 using test::kPing;
-using test::kPong;
 using test::kText;
 using test::RawClient;
 using test::RunningServer;
