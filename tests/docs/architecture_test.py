@@ -5,12 +5,10 @@ import importlib.util
 import os
 import pathlib
 import re
-import sys
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "python"))
-from sls.launcher.commands import COMMANDS  # noqa: E402
+from places import ROOT
+from sls.launcher.commands import COMMANDS
 
 DIAGRAMS = ROOT / "docs/diagrams"
 PAGES = ["README.md", "CONTRIBUTING.md", *(f"docs/{name}.md" for name in (
@@ -54,7 +52,6 @@ class ArchitectureTest(unittest.TestCase):
 
     def test_the_layers_are_those_of_the_include_rules(self):
         self.assertEqual((DIAGRAMS / "layers.dot").read_text(), self.make.draw_layers(), "run docs/diagrams/make.py")
-        self.assertGreater(len(self.make.read_rules()), 15)
 
     def test_every_diagram_is_shown(self):
         shown = {name for page in PAGES for name in re.findall(r"diagrams/(\w+)\.svg", read(page))}
@@ -102,7 +99,3 @@ class ArchitectureTest(unittest.TestCase):
         terms = [term.lower() for term in re.findall(r"^\| \*\*(.+?)\*\*", read("docs/glossary.md"), re.MULTILINE)]
         self.assertEqual(terms, sorted(set(terms)))
         self.assertGreater(len(terms), 30)
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

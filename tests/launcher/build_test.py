@@ -3,18 +3,15 @@
 The launcher runs in a small checkout, whose programs print a text of their sources. Stand-ins before the real cmake
 and ninja record how these are called."""
 
-import pathlib
 import re
 import shutil
 import subprocess
-import sys
 import unittest
 
-from checkout import ROOT, CheckoutTest
+from checkout import CheckoutTest
+from places import BUILD, ROOT
+from sls.launcher.building import FLYING
 
-BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
-sys.path.insert(0, str(ROOT / "python"))
-from sls.launcher.building import FLYING  # noqa: E402
 CMAKE = """cmake_minimum_required(VERSION 3.25)
 set(CMAKE_C_COMPILER_WORKS TRUE)  # these two save two builds in each new tree
 set(CMAKE_C_ABI_COMPILED TRUE)
@@ -215,7 +212,3 @@ class RealTreeTest(unittest.TestCase):
     def test_cmake_runs_again_when_a_preset_changes(self):
         rule = re.search(r"^build build\.ninja.*?: RERUN_CMAKE.*$", (BUILD / "build.ninja").read_text(), re.MULTILINE)
         self.assertTrue(f" {ROOT}/CMakePresets.json " in rule.group(0), "no rule depends on CMakePresets.json")
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

@@ -18,8 +18,8 @@ import subprocess
 import sys
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
+from places import BUILD, ROOT
+
 LAUNCHER = (ROOT / "sls").read_text(encoding="utf-8")
 SYSTEM = "".join(re.findall(r'^(?:ID|VERSION_ID)="?(\w+)"?$', "\n".join(sorted(
     pathlib.Path("/etc/os-release").read_text(encoding="utf-8").splitlines())), re.MULTILINE))  # such as debian12
@@ -289,7 +289,3 @@ class PackagesTest(unittest.TestCase):
         self.assertGreaterEqual(names, {"chromium", "codespell", "debootstrap", "git", "ip", "mandoc", "munged", "nft",
                                         "openssl", "slurmctld", "unshare", "/usr/bin/python3"})
         self.expect_in_closure({one for one in needed if not owners_of(one[1]) & others}, 50)
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

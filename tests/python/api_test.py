@@ -5,14 +5,14 @@ import hashlib
 import pickle
 import shutil
 
-import conftest
 import numpy as np
 import pytest
 import sls
 import yaml
+from places import ROOT, run_python
 from scipy.linalg import solve_continuous_are
 
-SHORT = conftest.ROOT / "config/scenarios/short.yaml"
+SHORT = ROOT / "config/scenarios/short.yaml"
 
 
 # --- scenarios ------------------------------------------------------------------------------------
@@ -167,8 +167,9 @@ def test_lqr_gains_fly_as_their_weights():
 # --- the package ----------------------------------------------------------------------------------
 
 
-def test_without_the_extension_module_the_rest_works(run_python, tmp_path):
+def test_without_the_extension_module_the_rest_works(monkeypatch, tmp_path):
     folder = sls.fly("short").save(tmp_path / "r").folder
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "python"))
     done = run_python(
         f"import sls\nrecording = sls.Recording({str(folder)!r})\nprint(recording.certificate)\n"
         "try: recording.state\n"
@@ -177,8 +178,7 @@ def test_without_the_extension_module_the_rest_works(run_python, tmp_path):
         "try: sls.fly('short')\n"
         "except ImportError as error: print(error)\n"
         "try: sls.Scenario\n"
-        "except ImportError as error: print(error)\n", path=str(conftest.ROOT / "python"),
-        cwd=tmp_path)
+        "except ImportError as error: print(error)\n", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     line = "expected the module _sls_core: run ./sls python or ./sls build"
     assert done.stdout.split("\n")[1:4] == [line, line, line]
@@ -193,7 +193,7 @@ def test_every_name_is_there_and_described():
         sls.flie
 
 
-def test_importing_the_package_reads_nothing_else(run_python):
+def test_importing_the_package_reads_nothing_else():
     done = run_python("import sys, sls\nprint([name for name in ('numpy', 'matplotlib', '_sls_core')"
                       " if name in sys.modules])")
     assert done.stdout == "[]\n", done.stderr

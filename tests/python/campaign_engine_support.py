@@ -11,6 +11,7 @@ import time
 from unittest import mock
 
 import support
+from places import ROOT
 
 HERE = pathlib.Path(__file__).resolve().parent
 FAKE = HERE / "fake_core"
@@ -39,8 +40,8 @@ class CampaignTest(support.FolderTest):
         return self.write(name, CAMPAIGN.format(runs=runs) + extra)
 
     def environment(self, **more):
-        path = os.pathsep.join([str(self.core), str(support.ROOT / "python")])
-        return {**os.environ, "PYTHONPATH": path, "SLS_BUILD": str(support.BUILD.resolve()), **more}
+        path = os.pathsep.join([str(self.core), str(ROOT / "python")])
+        return {**os.environ, "PYTHONPATH": path, **more}
 
     def start(self, *arguments, fake="", **options):
         """Starts the command line in a separate process, in the test's folder."""

@@ -5,19 +5,13 @@ import csv
 import json
 import math
 import subprocess
-import sys
 import unittest
 import unittest.mock
 
-import support
 import yaml
 from campaign_engine_support import CampaignTest
-
-CORE = support.BUILD.resolve() / "python"
-if not list(CORE.glob("_sls_core*")):
-    print("skipped: expected the module _sls_core, got none (./sls build)")
-    sys.exit(77)
-sys.path.insert(0, str(CORE))
+from own_domain import OwnDomain
+from places import BUILD
 
 BASE = """name: short
 vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
@@ -54,7 +48,7 @@ def end_x(flight):
 
 
 class FlightsTest(CampaignTest):
-    core = CORE
+    core = BUILD / "python"
 
     def write_campaign(self, extra=""):
         self.write("base.yaml", BASE)
@@ -219,7 +213,7 @@ class FlightsTest(CampaignTest):
 
     def test_runs_flown_over_dds_have_the_same_certificates(self):
         self.write_campaign("certify: { some: 3, seed: 1 }\n")  # other runs get a certificate in the verification
-        with support.OwnDomain() as domain:
+        with OwnDomain() as domain:
             said = self.fly("campaign.yaml", "--out", "out", "--verify", 4, "--domain", domain)
             self.assertIn("verify: 4 of 4 runs have the same certificate when flown over DDS", said)
             verified = json.loads((self.folder / "out/manifest.json").read_text())["verified"]
@@ -230,7 +224,3 @@ class FlightsTest(CampaignTest):
                             domain, code=1)
             self.assertRegex(said, rf"verify: run \d: expected certificate {'0' * 64}, got [0-9a-f]{{64}}")
             self.assertIn("verify: 0 of 1 runs have the same certificate", said)
-
-
-if __name__ == "__main__":
-    unittest.main()

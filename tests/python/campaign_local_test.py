@@ -17,7 +17,6 @@ import unittest
 import unittest.mock
 from pathlib import Path
 
-import support
 from campaign_engine_support import BASE, FAKE, CampaignTest
 
 sys.path.insert(0, str(FAKE))
@@ -456,7 +455,3 @@ def read_peak_mb(process):
     except (FileNotFoundError, ProcessLookupError):
         pass
     return 0.0
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -11,11 +11,9 @@ import client_program
 import numpy as np
 import pytest
 import sls
-from conftest import BUILD, PYTHON_PATH, ROOT
-
-sys.path.append(str(ROOT / "tests/support"))
-from own_domain import OwnDomain  # noqa: E402
-from processes import Processes, wait_until  # noqa: E402
+from own_domain import OwnDomain
+from places import BUILD, ROOT
+from processes import Processes, wait_until
 
 DEADLINE_S = 60
 LAWS = {name: client_program.LAWS[name] for name in ("pid", "counting")}
@@ -39,7 +37,7 @@ class Flight(Processes):
 
     def start_client(self, name="python", strength=0, law="pid"):
         return self.start(name, [sys.executable, "-B", ROOT / "tests/python/client_program.py", self.scenario,
-                                 str(self.domain), name, str(strength), law], PYTHONPATH=PYTHON_PATH)
+                                 str(self.domain), name, str(strength), law])
 
     def logs(self):
         return "\n".join(f"--- {name}\n{self.output(name)}" for name in self.started)
@@ -96,7 +94,7 @@ def test_a_python_law_flies_a_server_to_the_same_bits_as_in_process(tmp_path, do
 def test_the_example_flies_a_server(tmp_path, domain):
     with make_flight(tmp_path, domain) as flight:
         flight.start("python", [sys.executable, "-B", ROOT / "examples/python/pid_client.py", flight.scenario,
-                                f"--domain={domain}"], PYTHONPATH=PYTHON_PATH)
+                                f"--domain={domain}"])
         for name in ("server", "recorder", "python"):
             assert flight.wait(name) == 0, flight.logs()
         assert flight.manifest["complete"]

@@ -1,14 +1,14 @@
 """A real flight of the programs of this build, with its figures and its report."""
 
-import os
 import re
 import subprocess
 import textwrap
 import time
-import unittest
 
 import support
 import numpy as np
+from own_domain import OwnDomain
+from places import BUILD, ROOT, launch
 
 from sls.figures import make_figures
 from sls.metrics import calc_stage_metrics
@@ -16,7 +16,6 @@ from sls.recordings import Recording
 from sls.study import PUBLISHED_LAP_2
 from sls.tables import format_error
 
-LAUNCHER = support.ROOT / "sls"
 HOVER = """name: hover
 vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
 plant:
@@ -42,14 +41,11 @@ mission:
 
 class FlightTest(support.FolderTest):
     def run_launcher(self, *arguments):
-        done = subprocess.run([LAUNCHER, *arguments], cwd=self.folder, capture_output=True,
-                              env={**os.environ, "SLS_BUILD": support.BUILD}, text=True,
-                              timeout=200)
-        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        done = launch(*arguments, cwd=self.folder)
         return done.stdout + done.stderr
 
     def test_the_short_flight_is_plotted_and_reported(self):
-        domain = self.enterContext(support.OwnDomain())
+        domain = self.enterContext(OwnDomain())
         self.run_launcher("run", "short", "--out", "r", "--domain", domain)
         self.assertIn("figures: r/figures", self.run_launcher("plot", "r", "--panels", "path", "errors"))
         self.assertIn("report: r/report.html", self.run_launcher("report", "r"))
@@ -74,7 +70,7 @@ class FlightTest(support.FolderTest):
 
         # A recording that was plotted is still replaced by the next flight.
         self.run_launcher("run", "short", "--out", "r", "--force", "--domain", domain, "--qos",
-                          support.ROOT / "config/qos/udp.xml")
+                          ROOT / "config/qos/udp.xml")
         self.assertFalse((self.folder / "r/report.html").exists())
         self.assertFalse((self.folder / "r/figures").exists())
 
@@ -93,26 +89,26 @@ class FlightTest(support.FolderTest):
         self.assertLessEqual({"body_attitude", "body_rates", "rotors", "thrust"}, make_figures([flight]).keys())
 
     def test_documents_show_what_the_demo_prints_beside_the_published_figures(self):
-        domain = self.enterContext(support.OwnDomain())
+        domain = self.enterContext(OwnDomain())
         printed = self.run_launcher("demo", "figure_eight", "--out", "r", "--domain", domain)
         table = re.search(r"Load position error on the second lap.*?\n\n", printed, re.DOTALL)[0]
-        readme = (support.ROOT / "README.md").read_text()
+        readme = (ROOT / "README.md").read_text()
         self.assertIn(textwrap.indent(table, "    "), readme)
-        study_page = (support.ROOT / "docs/study.md").read_text()
+        study_page = (ROOT / "docs/study.md").read_text()
         for row in PUBLISHED_LAP_2[1:]:
             self.assertRegex(table, rf"{re.escape(row[0])} +{' +'.join(row[1:])}\n")
             self.assertIn(f"| published: {' | '.join(row)} |", study_page)
 
     def start(self, program, *arguments):
-        process = subprocess.Popen([f"{support.BUILD}/bin/{program}", *arguments], cwd=self.folder,
+        process = subprocess.Popen([f"{BUILD}/bin/{program}", *arguments], cwd=self.folder,
                                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.addCleanup(process.wait)
         self.addCleanup(process.kill)
         return process
 
     def test_laps_are_those_of_the_flight_for_a_recorder_that_joins_late(self):
-        domain = self.enterContext(support.OwnDomain())
-        text = (support.ROOT / "config/scenarios/short.yaml").read_text()
+        domain = self.enterContext(OwnDomain())
+        text = (ROOT / "config/scenarios/short.yaml").read_text()
         for old, new in (("recorders: 1", "recorders: 0"), ("period_s: 16", "period_s: 6"),
                          ("for_s: 2", "for_s: 20")):
             self.assertIn(old, text)
@@ -120,11 +116,11 @@ class FlightTest(support.FolderTest):
         self.write("s.yaml", text)
         same = ("--scenario", "s.yaml", "--domain", domain)
         # The writer keeps 180 batches of at most 27 steps: step 0 is lost for a late recorder.
-        profiles = (support.ROOT / "config/qos/endpoints.xml").read_text()
+        profiles = (ROOT / "config/qos/endpoints.xml").read_text()
         begin = profiles.index('<data_writer profile_name="sls_record_writer">')
         end = profiles.index("</data_writer>", begin) + len("</data_writer>")
         writer = profiles[begin:end].replace("5000<", "180<")
-        qos = (support.ROOT / "config/qos/default.xml").read_text()
+        qos = (ROOT / "config/qos/default.xml").read_text()
         self.write("qos.xml", qos.replace("</profiles>", writer + "</profiles>"))
         server = self.start("sim_server", *same, "--period-s", "0.001", "--qos", "qos.xml")
         operator = ("ctl", "--domain", domain, "--timeout-s", "100")
@@ -163,7 +159,3 @@ class FlightTest(support.FolderTest):
         path = self.folder / "r" / f"{name}.csv"
         lines = path.read_text().split("\n")[:-1] if path.exists() else []
         return np.genfromtxt(lines, delimiter=",", names=True) if len(lines) > 2 else []
-
-
-if __name__ == "__main__":
-    unittest.main()

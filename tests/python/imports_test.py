@@ -4,9 +4,9 @@ count, too: they hide a circle, but do not untie it."""
 import ast
 import unittest
 
-import support
+from places import ROOT
 
-PACKAGE = support.ROOT / "python"
+PACKAGE = ROOT / "python"
 
 
 def list_modules():
@@ -57,7 +57,3 @@ class ImportsTest(unittest.TestCase):
         self.assertIn("sls.campaign.folder", modules)
         circle = find_circle({name: find_imports(name, file, modules) for name, file in modules.items()})
         self.assertEqual(circle, [], " imports ".join(circle))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -3,7 +3,6 @@
 import math
 import unittest
 
-import support
 import numpy as np
 
 from sls import metrics
@@ -111,7 +110,3 @@ class StageMetricsTest(unittest.TestCase):
         np.testing.assert_array_equal(calc_rod(np.zeros(1), np.zeros(1)), [[0, 0, 1]])
         rods = calc_rod(np.linspace(-1, 1, 9), np.linspace(1, -1, 9))
         np.testing.assert_allclose(np.linalg.norm(rods, axis=1), 1, atol=1e-15)
-
-
-if __name__ == "__main__":
-    unittest.main()

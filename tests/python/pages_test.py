@@ -14,13 +14,14 @@ import support
 import numpy as np
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from places import BUILD, ROOT
 from sls import figures
 from sls.recordings import Recording
 from support import write_recording
 
 LONG = "_figure_eight_with_a_heavier_load_a_delay_and_a_gust_from_the_north"[:63]
 NO_SCENE = "sls: report without its scene: "
-VIEWER, FLYER = support.BUILD / "bin/sls_view", support.BUILD / "bin/closed_loop"
+VIEWER, FLYER = BUILD / "bin/sls_view", BUILD / "bin/closed_loop"
 os.environ.pop("SLS_VIEW", None)  # only tests of the scene use sls_view
 
 ALL = {"positions", "errors", "path", "angles", "forces", "attitude"}
@@ -105,13 +106,13 @@ class PlotTest(support.FolderTest):
         write_recording(self.folder / "r", last=50)
         flight = Recording(self.folder / "r").load_flight(0, "r")
         drawn = figures.make_figures([flight])
-        colours = dict(re.findall(r"--(\w+): (#\w+)", (support.ROOT / "python/sls/colours.css").read_text()))
+        colours = dict(re.findall(r"--(\w+): (#\w+)", (ROOT / "python/sls/colours.css").read_text()))
         lines = {line.get_label(): line.get_color() for line in drawn["positions"].axes[0].lines}
         self.assertEqual((lines["load"], lines["quadrotor"], lines["reference"]),
                          (colours["load"], colours["quad"], colours["reference"]))
         self.assertEqual(drawn["errors"].axes[0].lines[0].get_color(), colours["load"])
         self.assertEqual(drawn["forces"].axes[0].lines[0].get_color(), colours["quad"])
-        style = "".join(file.read_text() for file in (support.ROOT / "tools/view/page/src").rglob("*.css"))
+        style = "".join(file.read_text() for file in (ROOT / "tools/view/page/src").rglob("*.css"))
         self.assertIn("python/sls/colours.css", style)
         for colour in colours.values():
             self.assertNotIn(colour, style)
@@ -327,7 +328,7 @@ class SceneTest(support.FolderTest):
 
     def fly(self, name, text=None):
         """Flies a shipped scenario, or `text`. Returns the recording's folder."""
-        text = text or (support.ROOT / f"config/scenarios/{name}.yaml").read_text()
+        text = text or (ROOT / f"config/scenarios/{name}.yaml").read_text()
         scenario = self.write(f"{name}.yaml", text)
         subprocess.run([FLYER, "--scenario", scenario, "--out", self.folder / name], check=True,
                        capture_output=True, timeout=200)
@@ -379,13 +380,13 @@ class SceneTest(support.FolderTest):
     @unittest.skipUnless(VIEWER.exists() and FLYER.exists(), "skipped: no sls_view in this build")
     @without_drawing
     def test_scenes_of_long_flights_stay_within_4_mb(self):
-        text = (support.ROOT / "config/scenarios/figure_eight.yaml").read_text()
+        text = (ROOT / "config/scenarios/figure_eight.yaml").read_text()
         self.expect_large_scene(self.fly("long", re.sub(r"for_s: \d+", "for_s: 160", text)))
 
     @unittest.skipUnless(FLYER.exists(), "skipped: no closed_loop in this build")
     @without_drawing
     def test_one_load_on_cables_is_told_once_with_its_cables(self):
-        text = (support.ROOT / "config/scenarios/cable_cut.yaml").read_text()
+        text = (ROOT / "config/scenarios/cable_cut.yaml").read_text()
         name = self.fly("cable_cut", text.replace("release_s: 8", "release_s: 1").replace("for_s: 22", "for_s: 2"))
         flights = Recording(self.folder / name).load_fleet()
         drawn = figures.make_figures(flights[:1], flights)
@@ -407,7 +408,3 @@ class SceneTest(support.FolderTest):
         page, output = self.make_report(name, VIEWER)
         self.assertEqual(page.read_text().count("<iframe"), 1, output)
         self.assertGreater(page.stat().st_size, 2_000_000)  # the scene uses the allowed bytes
-
-
-if __name__ == "__main__":
-    unittest.main()

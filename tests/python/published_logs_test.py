@@ -1,7 +1,6 @@
 """Reads the published formats from small files, which this test writes with independent formulas."""
 
 import math
-import unittest
 
 import support
 import numpy as np
@@ -99,7 +98,3 @@ class PublishedLogsTest(support.FolderTest):
             load_log(binary, "b")
         with self.assertRaisesRegex(InputError, "nowhere.csv: expected a file, got: No such file"):
             load_log(self.folder / "nowhere.csv", "c")
-
-
-if __name__ == "__main__":
-    unittest.main()

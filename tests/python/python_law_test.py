@@ -3,10 +3,10 @@
 import importlib.util
 import threading
 
-import conftest
 import numpy as np
 import pytest
 import sls
+from places import ROOT
 
 WEIGHT_N = 1.7 * 9.8  # of the scenario `short`
 HOVER = [{"hold": {"position_m": [0, 0, -0.5]}, "for_s": 1.0}]
@@ -14,7 +14,7 @@ HOVER = [{"hold": {"position_m": [0, 0, -0.5]}, "for_s": 1.0}]
 
 def load_example(name):
     spec = importlib.util.spec_from_file_location(
-        name, conftest.ROOT / f"examples/python/{name}.py")
+        name, ROOT / f"examples/python/{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -3,7 +3,6 @@ fleets."""
 
 import json
 import shutil
-import unittest
 
 import support
 import numpy as np
@@ -230,7 +229,3 @@ class RecordingsTest(support.FolderTest):
             del manifest[key]
         (folder / "manifest.json").write_text(json.dumps(manifest))
         self.assertEqual(len(self.load().time_s), 2 * STEPS_PER_STAGE + 1)
-
-
-if __name__ == "__main__":
-    unittest.main()
