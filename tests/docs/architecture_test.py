@@ -11,8 +11,7 @@ from places import ROOT
 from sls.launcher.commands import COMMANDS
 
 DIAGRAMS = ROOT / "docs/diagrams"
-PAGES = ["README.md", "CONTRIBUTING.md", *(f"docs/{name}.md" for name in (
-    "architecture", "design", "glossary", "limits", "results"))]
+PAGES = ("README.md", "docs/architecture.md", "docs/design.md")
 CODE = (".cpp", ".hpp", ".h", ".py", ".ts")
 FOLDERS = ("bench", "closed_loop", "common", "control_client", "python", "recorder", "sim_server", "tests", "tools")
 
@@ -89,13 +88,3 @@ class ArchitectureTest(unittest.TestCase):
         known = list(COMMANDS)
         self.assertEqual([name for name in commands if name not in known], [])
         self.assertIn("./sls test", read("README.md"))
-
-    def test_lines_fit(self):
-        long = [f"{page}:{number}" for page in PAGES for number, line in enumerate(read(page).splitlines(), 1)
-                if len(line) > 120 and not line.startswith(("|", "    "))]
-        self.assertEqual(long, [])
-
-    def test_each_term_of_the_glossary_stands_once_and_in_order(self):
-        terms = [term.lower() for term in re.findall(r"^\| \*\*(.+?)\*\*", read("docs/glossary.md"), re.MULTILINE)]
-        self.assertEqual(terms, sorted(set(terms)))
-        self.assertGreater(len(terms), 30)

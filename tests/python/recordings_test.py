@@ -106,6 +106,13 @@ class RecordingsTest(support.FolderTest):
         np.testing.assert_allclose(second.max_m, 0.001, rtol=1e-9)
         self.assertIsNone(eight.step)
 
+    def test_laps_count_from_the_start_of_a_stage_that_the_recorder_joined_late(self):
+        write_recording(self.folder / "r", first=450)
+        self.change("manifest.json", lambda text: json.dumps(
+            {**json.loads(text), "stage_starts": [{"vehicle_id": 0, "stage": 1, "step": 400}]}))
+        _, first, second = calc_stage_metrics(self.load())
+        self.assertEqual([first.label, first.from_s, second.label, second.from_s], ["lap 1 (part)", 4.5, "lap 2", 6.0])
+
     def test_a_killed_recorder_leaves_what_is_read_and_said(self):
         write_recording(self.folder / "r", last=150, complete=False)
         self.change("state.csv", lambda text: text[:-30])
