@@ -39,6 +39,11 @@ class CampaignTest(support.FolderTest):
         self.write("base.yaml", BASE)
         return self.write(name, CAMPAIGN.format(runs=runs) + extra)
 
+    def fly_whole(self, runs=40):
+        """Flies the campaign in one go, into the folder `whole`."""
+        self.write_campaign(runs)
+        self.fly("campaign.yaml", "--out", "whole")
+
     def environment(self, **more):
         path = os.pathsep.join([str(self.core), str(ROOT / "python")])
         return {**os.environ, "PYTHONPATH": path, **more}
