@@ -301,7 +301,7 @@ class ProgramTest(FolderTest):
 
     def test_a_quick_start_part_measures_a_short_flight_with_the_launcher_and_without(self):
         file = self.folder / "bench.json"
-        launch("bench", "--quick", "--only", "start", "--json", file)
+        launch("bench", "--quick", "--only", "start", "--json", file, timeout=600)
         figures = {figure["name"]: figure for figure in self.check(file, "start")}
         self.assertEqual({figure["goal"]["value"] for figure in figures.values() if "goal" in figure},
                          {0.8, 0.7, 0.6, 0.9})
@@ -316,7 +316,7 @@ class ProgramTest(FolderTest):
             words += ["--out", self.folder / "plots"]
         except ImportError:
             pass
-        said = launch("bench", *words)
+        said = launch("bench", *words, timeout=600)
         figures = self.check(file, "lockstep")
         self.assertIn("shared memory, with recorder", said.stdout)
         self.assertIn("where a step goes", said.stdout)
@@ -340,20 +340,20 @@ class ProgramTest(FolderTest):
 
     def test_a_quick_load_part_compares_with_no_load_and_with_no_spinning(self):
         file = self.folder / "bench.json"
-        launch("bench", "--quick", "--only", "load", "--json", file)
+        launch("bench", "--quick", "--only", "load", "--json", file, timeout=600)
         names = [figure["name"] for figure in self.check(file, "load") if "ratio" in figure]
         self.assertEqual(sum("1 busy loop" in name for name in names), 3)
         self.assertEqual(sum("beside blocking" in name for name in names), 2)
 
     def test_a_quick_realtime_part_stands_beside_a_thread_that_only_sleeps(self):
         file = self.folder / "bench.json"
-        launch("bench", "--quick", "--only", "realtime", "--json", file)
+        launch("bench", "--quick", "--only", "realtime", "--json", file, timeout=600)
         late = [figure for figure in self.check(file, "realtime") if "ratio" in figure]
         self.assertEqual(len(late), 2 * len(loop.PERCENTILES))
 
     @unittest.skipUnless(GOOGLE_BENCHMARK.exists(), "skipped: libbenchmark-dev is missing")
     def test_a_quick_plant_part_compares_with_the_closed_form(self):
         file = self.folder / "bench.json"
-        launch("bench", "--quick", "--only", "plant", "--json", file)
+        launch("bench", "--quick", "--only", "plant", "--json", file, timeout=600)
         ratios = [figure for figure in self.check(file, "plant") if "ratio" in figure]
         self.assertEqual(len(ratios), 4)  # 1, 2, 10 and 100 vehicles

@@ -127,26 +127,17 @@ class BuildTest(CheckoutTest):
         self.git("switch", "-q", "one")
         self.expect_built("first")
 
-    def test_another_preset_is_applied(self):
-        self.expect_built("first")
-        presets = (self.root / "CMakePresets.json").read_text()
-        self.assertIn('"CMAKE_BUILD_TYPE": "Release"', presets)
-        self.write("CMakePresets.json", presets.replace('"CMAKE_BUILD_TYPE": "Release"',
-                                                        r'"CMAKE_C_FLAGS": "-DTEXT=\\\"flag\\\""'))
-        self.write("text.h", "")
-        self.expect_built("flag")
-        self.expect_not_built("flag")
-
-    def test_a_preset_with_another_compiler_keeps_its_values(self):
+    def test_another_preset_is_applied_also_one_with_another_compiler(self):
         self.expect_built("first")
         (self.folder / "bin/other_cc").symlink_to(shutil.which("cc"))
         presets = (self.root / "CMakePresets.json").read_text()
-        self.write("CMakePresets.json", presets.replace(
-            '"CMAKE_BUILD_TYPE": "Release"',
-            r'"CMAKE_C_COMPILER": "other_cc", "CMAKE_C_FLAGS": "-DTEXT=\\\"other\\\""'))
+        self.assertIn('"CMAKE_BUILD_TYPE": "Release"', presets)
         self.write("text.h", "")
-        self.expect_built("other")
-        self.expect_not_built("other")
+        for text, compiler in (("flag", ""), ("other", '"CMAKE_C_COMPILER": "other_cc", ')):
+            self.write("CMakePresets.json", presets.replace(
+                '"CMAKE_BUILD_TYPE": "Release"', rf'{compiler}"CMAKE_C_FLAGS": "-DTEXT=\\\"{text}\\\""'))
+            self.expect_built(text)
+            self.expect_not_built(text)
 
     def test_a_first_flight_builds_what_it_needs_and_a_whole_tree_stays_whole(self):
         self.assertIn("cmake --preset flight --fresh", self.expect_flight("first"))
@@ -158,7 +149,10 @@ class BuildTest(CheckoutTest):
         self.expect_not_built("header")
 
     def test_a_long_build_says_how_far_it_is_by_the_lines_of_its_files_once_a_tenth_is_done(self):
-        self.write("compiler", '#!/bin/sh\ncase "$*" in *closed_loop*) sleep 18 ;; esac\nexec "$@"\n')
+        launcher = (self.root / "sls").read_text()
+        self.assertIn(" next=15\n", launcher)
+        (self.root / "sls").write_text(launcher.replace(" next=15\n", " next=6\n"))  # the first time after 6 s
+        self.write("compiler", '#!/bin/sh\ncase "$*" in *closed_loop*) sleep 8 ;; esac\nexec "$@"\n')
         (self.root / "compiler").chmod(0o755)
         self.write("CMakeLists.txt", CMAKE + """add_executable(long long.c)
 set_target_properties(${programs} long PROPERTIES C_COMPILER_LAUNCHER ${CMAKE_SOURCE_DIR}/compiler)

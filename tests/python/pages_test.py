@@ -40,6 +40,9 @@ def without_drawing(test):
 
 
 class PlotTest(support.FolderTest):
+    def load(self, **what):
+        return Recording(write_recording(self.folder / "r", **what)).load_flight(0, "r")
+
     def test_one_recording_gives_every_figure_as_png_and_pdf_beside_it(self):
         write_recording(self.folder / "r")
         code, output = self.run_sls("plot", "r")
@@ -103,8 +106,7 @@ class PlotTest(support.FolderTest):
         self.assertEqual(names_of(self.folder / "o", "png"), BODY)
 
     def test_load_and_quadrotor_have_one_colour_each_in_scene_and_figures(self):
-        write_recording(self.folder / "r", last=50)
-        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flight = self.load(last=50)
         drawn = figures.make_figures([flight])
         colours = dict(re.findall(r"--(\w+): (#\w+)", (ROOT / "python/sls/colours.css").read_text()))
         lines = {line.get_label(): line.get_color() for line in drawn["positions"].axes[0].lines}
@@ -118,8 +120,7 @@ class PlotTest(support.FolderTest):
             self.assertNotIn(colour, style)
 
     def test_flights_drawn_together_differ_in_line_style_too(self):
-        write_recording(self.folder / "r", last=50)
-        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flight = self.load(last=50)
         flights = [replace(flight, name=str(number)) for number in range(9)]
         for name, figure in figures.make_figures(flights).items():
             lines = [line for line in figure.axes[0].lines if line.get_label() != "reference"]
@@ -145,15 +146,13 @@ class PlotTest(support.FolderTest):
         self.expect_refused(["plot", "r", "--paper", "9"], "--paper: expected 0.5 to 4 columns, got '9'")
 
     def test_an_error_that_is_always_0_has_no_logarithmic_axis(self):
-        write_recording(self.folder / "r", last=50)  # a set-point: no error in x and y
-        figure = figures.make_figures([Recording(self.folder / "r").load_flight(0, "r")])["errors"]
+        figure = figures.make_figures([self.load(last=50)])["errors"]  # a set-point: no error in x and y
         self.assertEqual([axes.get_yscale() for axes in figure.axes], ["linear"] * 5 + ["log"])
         self.assertEqual([text.get_text() for text in figure.axes[1].texts], ["0 at every step"])
         self.assertEqual(list(figure.axes[1].get_yticks()), [])
 
     def test_long_names_stay_within_the_figure(self):
-        write_recording(self.folder / "r", last=50)
-        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flight = self.load(last=50)
         for paper in (None, 1.0):
             flights = [replace(flight, name=f"{number}{LONG}") for number in range(5)]
             figure = figures.make_figures(flights, (), paper)["errors"]
@@ -163,8 +162,7 @@ class PlotTest(support.FolderTest):
             self.assertGreater(legend.y0, max(axes.get_window_extent().y1 for axes in figure.axes))
 
     def test_commanded_and_actual_motion_are_drawn_together(self):
-        write_recording(self.folder / "r", last=50, rotors=4)
-        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flight = self.load(last=50, rotors=4)
         drawn = figures.make_figures([flight])
         for name, rows in (("body_attitude", 3), ("rotors", 4), ("thrust", 1)):
             all_axes = drawn[name].axes
@@ -188,8 +186,7 @@ class PlotTest(support.FolderTest):
         np.testing.assert_allclose(rate, np.degrees(-0.2))
 
     def test_every_stage_is_marked_on_all_axes(self):
-        write_recording(self.folder / "r", last=600)
-        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flight = self.load(last=600)
         eight = flight.stages[1]
         flight = replace(flight, stages=(*flight.stages[:1], replace(eight, end=500),
                                          replace(eight, index=2, first=500)))

@@ -39,7 +39,7 @@ class StudyTest(unittest.TestCase):
     def setUpClass(cls):
         with contextlib.ExitStack() as stack:
             cls.folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            launch("study", "--out", "s", "--recordings", "r", cwd=cls.folder)
+            launch("study", "--out", "s", "--recordings", "r", cwd=cls.folder, timeout=1500)
             cls.addClassCleanup(stack.pop_all().close)
         cls.page = (cls.folder / "s/study.md").read_text()
 

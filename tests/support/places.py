@@ -8,9 +8,9 @@ ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("SLS_BUILD", ROOT / "build")).resolve()
 
 
-def launch(*words, code=0, **options):
+def launch(*words, code=0, timeout=200, **options):
     """Runs ./sls. Its exit code must be `code`."""
-    done = subprocess.run([ROOT / "sls", *map(str, words)], capture_output=True, text=True, timeout=600, **options)
+    done = subprocess.run([ROOT / "sls", *map(str, words)], capture_output=True, text=True, timeout=timeout, **options)
     assert done.returncode == code, done.stdout + done.stderr
     return done
 
