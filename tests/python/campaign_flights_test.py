@@ -8,23 +8,17 @@ import subprocess
 import unittest
 import unittest.mock
 
+import sls
 import yaml
 from campaign_engine_support import CampaignTest
 from own_domain import OwnDomain
 from places import BUILD
 
-BASE = """name: short
-vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
-plant: { model: analytic, step_s: 0.001, initial: { load_position_m: [0, 0, -0.5] } }
-sync: { mode: realtime, period_s: 0.004, real_time_factor: 1 }
-controller: { law: qsf, gains: { lqr: { horizontal: 10, vertical: 5 } }, force_limit_n: 200 }
-mission:
-  - set_point: { position_m: [0.5, 0, -0.5] }
-    for_s: 3
-faults:
-  - noise: { on: command, force_n: [0.1, 0.1, 0.1], seed: 0 }
-  - bias: { on: command, force_n: [0.1, 0, 0] }
-"""
+BASE = sls.load_scenario("short", changes={
+    "plant": {"model": "analytic", "step_s": 0.001, "initial": {"load_position_m": [0, 0, -0.5]}}, "sync.mode": "realtime",
+    "mission": [{"set_point": {"position_m": [0.5, 0, -0.5]}, "for_s": 3}],
+    "faults": [{"noise": {"on": "command", "force_n": [0.1, 0.1, 0.1], "seed": 0}},
+               {"bias": {"on": "command", "force_n": [0.1, 0, 0]}}]}).text
 # A push of 12 N loses the load, and the force limit of 5 N fails at once.
 CAMPAIGN = """base: base.yaml
 runs: 6
@@ -60,7 +54,6 @@ class FlightsTest(CampaignTest):
 
     def fly_row(self, row):
         """Flies the run of `row` with the package, without a campaign."""
-        import sls
         paths = ("faults.1.bias.force_n", "controller.force_limit_n", "faults.0.noise.seed")
         return sls.fly(sls.load_scenario(self.folder / "base.yaml", changes={
             path: yaml.safe_load(row[path]) for path in paths}))

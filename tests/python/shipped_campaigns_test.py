@@ -1,9 +1,7 @@
 """The campaigns of config/campaigns: files, bases, first and last runs, and the linear predictions for
 them."""
 
-import tempfile
 import unittest
-from pathlib import Path
 
 import numpy as np
 from places import ROOT
@@ -13,7 +11,6 @@ from sls.campaign import findings, predictions
 from sls.campaign.campaign_file import load_campaign
 from sls.campaign.check import check_campaign
 from sls.campaign.sampling import make_values, to_yaml_value
-from sls.input_error import InputError
 
 FOLDER = ROOT / "config/campaigns"
 FILES = sorted(FOLDER.glob("*.yaml"))
@@ -47,17 +44,6 @@ class ShippedCampaignsTest(unittest.TestCase):
                 runs.check(list_values(campaign, 0))
                 runs.check(list_values(campaign, campaign.runs - 1))
                 check_campaign(campaign, runs)
-
-    def test_another_number_of_vehicles_is_refused_with_the_line_of_the_campaign(self):
-        with tempfile.TemporaryDirectory() as folder:
-            file = Path(folder) / "numbers.yaml"
-            file.write_text(f"base: {ROOT}/config/scenarios/short.yaml\nvary:\n  vehicles: {{ list: [1, 2] }}\n"
-                            "measure: [outcome]\n")
-            campaign = load_campaign(file)
-            with self.assertRaises(InputError) as raised:
-                check_campaign(campaign, make_runs(campaign))
-            self.assertEqual(str(raised.exception), f"{file}:3: vary.vehicles: run 1: expected 1, as in the base "
-                             "scenario, got 2")
 
     def test_both_laws_of_a_pair_get_the_same_disturbances(self):
         campaign = load_campaign(FOLDER / "law_comparison.yaml")
