@@ -31,8 +31,9 @@ TEST_F(NetworkTest, WiresWithDelayAndJitterWherePacketsComeTwiceAndOutOfOrder) {
   for (const char* host : {"controller", "server", "recorder"}) {
     const std::string said = network_->end_wire(host);
     EXPECT_EQ(said.find(" 0 overtaken"), std::string::npos) << said;
-    if (host != std::string("controller"))
+    if (host != std::string("controller")) {
       EXPECT_EQ(said.find(" 0 duplicated"), std::string::npos) << said;
+    }
   }
 }
 

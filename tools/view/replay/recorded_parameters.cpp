@@ -53,8 +53,8 @@ void set_columns(Parameters& message, const fs::path& folder,
   for (std::size_t index = count; index < file.columns().size(); ++index) {
     SignalDescription& signal = message.signals().emplace_back();
     signal.name(file.columns()[index]);
-    for (const record::ManifestFile::Signal& known : manifest.signals)
-      if (known.name == file.columns()[index]) signal.unit(known.unit);
+    for (const record::ManifestFile::Signal& of_manifest : manifest.signals)
+      if (of_manifest.name == signal.name()) signal.unit(of_manifest.unit);
   }
 }
 
