@@ -486,7 +486,7 @@ def make_margin_table(recordings: Path) -> str:
 
 def make_values(flown: dict[str, Flown], recordings: Path,
                 published: Sequence[str]) -> dict[str, str]:
-    """Values for the names in braces in this chapter of study_page.md."""
+    """The values of this chapter by the names of their markers."""
     def describe_limit(gains: str, lag_s: float) -> str:
         late = Lateness(lag_s=lag_s)
         return f"{calc_stability_limit(make_chain(gains), lag_s) - calc_hold(late):.3f}"

@@ -1,4 +1,4 @@
-"""The comparison of our flights with the published ones: docs/study.md and its pictures."""
+"""The comparison of our flights with the published ones: the numbers and pictures of docs/study.md."""
 
 import csv
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ from sls.figures import STYLE, draw, lay_out, make_stack, plot_path, plot_positi
 from sls.trajectory import Trajectory
 from sls.metrics import StageMetrics, calc_stage_metrics, split_laps
 from sls.px4_study import Planned, RunFailed, measure, shift_to_published
-from sls.tables import (format_error, list_error_cells, list_step_cells, make_markdown_table)
+from sls.tables import fill_page, format_error, list_error_cells, list_step_cells, make_markdown_table
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -178,15 +178,15 @@ PUBLISHED_PX4 = PUBLISHED_LAP_2[-1][1:]
 
 
 def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str]) -> str:
-    """study_page.md, with the numbers and tables filled in."""
+    """docs/study.md, with the numbers and tables filled in."""
     def describe_height(name: str, digits: int) -> str:
         metrics = calc_stage_metrics(flights[name])[0]
         return f"{abs(1000.0 * metrics.step.steady_state_error_m[2]):.{digits}f}"
 
     legs = [flights[f"matlab_setpoint_{leg}"] for leg in (1, 2, 3)]
     rod_error = measure(flights["gazebo_correct_wiring"], "").rms_m[2]
-    return (HERE / "study_page.md").read_text().format(
-        count=len(FLIGHTS) + len(px4_study.FLIGHTS),
+    return fill_page(ROOT / "docs/study.md", px4_values | dict(
+        count=str(len(FLIGHTS) + len(px4_study.FLIGHTS)),
         lap_table=make_lap_table(flights),
         hold=describe_gain(flights, "figure_eight", "figure_eight_1ms", "xyz", 2),
         wired=describe_gain(flights, "gazebo_legacy", "gazebo_correct_wiring", "xy", 0),
@@ -198,7 +198,7 @@ def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str]) -> str
         integral_table=make_step_table([flights["integral_mass_error"],
                                         flights["mass_error_without_integral"]]),
         drag=describe_gain(flights, "rotor_drag_without_feed_forward", "rotor_drag", "xyz", 0),
-        drag_table=make_drag_table(flights), **px4_values)
+        drag_table=make_drag_table(flights)))
 
 
 def write_study(recordings: Path, out: Path) -> Path:

@@ -13,6 +13,7 @@ from sls.campaign.predictions import (calc_rest_error, calc_team_limit, change_f
                                       read_base_team)
 from sls.campaign.run_table import OUTCOMES, RunTable
 from sls.figures import colour_of
+from sls.tables import make_markdown_table
 
 
 def study_team(table: RunTable) -> tuple[Figure, dict[str, str]]:
@@ -110,12 +111,11 @@ def study_team_failure(table: RunTable) -> tuple[Figure, dict[str, str]]:
     def describe(run: tuple[int, int, int]) -> str:
         return f"{errors[run]:.3f}" if outcome[run] == 0 else OUTCOMES[outcome[run]]
 
-    rows = "\n".join(
-        f"| {gain:g} | " + " | ".join(
-            [describe((row, 0, 0)), describe((row, 1, frozen)),
-             *(describe((row, 1, place)) for place in lifts[1:])]) + " |" for row, gain in enumerate(gains))
+    rows = make_markdown_table(
+        ("k_R, 1/s²", "its cable is cut", "its client dies, the force stays",
+         *(f"{value:g} N less lift" for value in by_lift[1:])),
+        [[f"{gain:g}", describe((row, 0, 0)), describe((row, 1, frozen)),
+          *(describe((row, 1, place)) for place in lifts[1:])] for row, gain in enumerate(gains)])
     is_cut_off = np.array_equal(errors[:, 0], np.repeat(errors[:, 0, :1], len(words), axis=1), equal_nan=True)
-    return figure, {"tf_runs": str(len(table)), "tf_rows": rows,
-                    "tf_lifts": " | ".join(f"{value:g} N less lift" for value in by_lift[1:]),
-                    "tf_rule": " | ".join("---" for _ in by_lift[1:]),
+    return figure, {"tf_runs": str(len(table)), "tf_table": rows,
                     "tf_cut_off": "nothing" if is_cut_off else "something"}
