@@ -22,20 +22,12 @@ DPI = 100
 
 
 FLIGHTS = (
-    Planned("figure_eight", "figure_eight"),
     Planned("figure_eight_1ms", "figure_eight", period_s=0.001),
-    Planned("matlab_setpoint_1", "matlab_setpoint_1", period_s=0.001),
-    Planned("matlab_setpoint_2", "matlab_setpoint_2", period_s=0.001),
-    Planned("matlab_setpoint_3", "matlab_setpoint_3", period_s=0.001),
-    Planned("matlab_figure_eight", "matlab_figure_eight", period_s=0.001),
-    Planned("setpoints", "setpoints"),
-    Planned("gazebo_legacy", "gazebo_legacy"),
-    Planned("gazebo_correct_wiring", "gazebo_correct_wiring"),
-    Planned("gazebo_corrected", "gazebo_corrected"),
-    Planned("integral_mass_error", "integral_mass_error"),
-    Planned("mass_error_without_integral", "mass_error_without_integral"),
-    Planned("rotor_drag", "rotor_drag"),
-    Planned("rotor_drag_without_feed_forward", "rotor_drag_without_feed_forward"),
+    *(Planned(f"matlab_{name}", f"matlab_{name}", period_s=0.001)
+      for name in ("setpoint_1", "setpoint_2", "setpoint_3", "figure_eight")),
+    *(Planned(name, name) for name in (
+        "figure_eight", "setpoints", "gazebo_legacy", "gazebo_correct_wiring", "gazebo_corrected", "integral_mass_error",
+        "mass_error_without_integral", "rotor_drag", "rotor_drag_without_feed_forward")),
 )
 
 # Load position error on the second lap, m, from the logs of the published MATLAB, Gazebo and PX4

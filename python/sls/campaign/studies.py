@@ -35,8 +35,7 @@ def study_mass_and_delay(table: RunTable) -> tuple[Figure, dict[str, str]]:
     axes.axvline(sag_mass, color="#0b5394", linewidth=2, linestyle="--",
                  label="linear: sags by a rod length")
     axes.axvline(LOAD_MASS_KG, color="#444444", linewidth=0.8, linestyle=":")
-    axes.set_xlabel("mass of the load (kg); the controller assumes 0.2")
-    axes.set_ylabel("delay of the command (s)")
+    axes.set(xlabel="mass of the load (kg); the controller assumes 0.2", ylabel="delay of the command (s)")
     axes.legend(handles=[*list_class_handles(range(4)), *axes.lines[:2]], loc="upper left",
                 bbox_to_anchor=(1.0, 1.0))
 
@@ -93,9 +92,7 @@ def study_gains(table: RunTable) -> tuple[Figure, dict[str, str]]:
                         linestyle=":", linewidth=1)
     for one, title in zip(axes, ("largest error in x under the gust (m)", "largest force (N)",
                                  "largest delay that finishes (s)")):
-        one.set_xscale("log")
-        one.set_xlabel("horizontal weight")
-        one.set_title(title)
+        one.set(xscale="log", xlabel="horizontal weight", title=title)
     axes[0].set_yscale("log")
     axes[1].set_yscale("log")
     axes[0].legend()
@@ -128,8 +125,7 @@ def study_wind(table: RunTable) -> tuple[Figure, dict[str, str]]:
     everything = np.ones(len(table), dtype=bool)
     draw_share(left, table, "_gust_n", np.arange(0, 4.01, 0.2), everything, colour_of(1), "flown")
     left.axvline(threshold, color="#0b5394", linestyle="--", label="linear: 1 m without wind")
-    left.set_xlabel("gust (N)")
-    left.set_ylabel("share lost")
+    left.set(xlabel="gust (N)", ylabel="share lost")
     left.legend(loc="lower right")
     lost = table.outcome != 0
     for chosen, colour, label in ((~lost, "#0072b2", "finished"), (lost, "#d55e00", "lost")):
@@ -138,9 +134,7 @@ def study_wind(table: RunTable) -> tuple[Figure, dict[str, str]]:
     turn = np.linspace(0, 2 * np.pi, 181)
     right.plot(threshold * np.cos(turn), threshold * np.sin(turn), color="#0b5394",
                linestyle="--")
-    right.set_aspect("equal")
-    right.set_xlabel("gust in x (N)")
-    right.set_ylabel("gust in y (N)")
+    right.set(aspect="equal", xlabel="gust in x (N)", ylabel="gust in y (N)")
     right.legend(loc="upper right", markerscale=3)
     share, low, high = calc_share(table, everything)
     near = calc_share(table, (gust > 0.9 * threshold) & (gust < 1.1 * threshold))
@@ -189,10 +183,8 @@ def study_integral(table: RunTable) -> tuple[Figure, dict[str, str]]:
     left.scatter(np.abs(sag + offset)[vertical], np.abs(offset)[vertical], s=14, facecolors="none",
                  edgecolors="#009e73", linewidths=0.7, label="|error of the rod's length|")
     left.legend(loc="upper left")
-    left.set_xlabel("predicted without integral (m)")
-    left.set_ylabel("error in z at rest (m)")
-    right.set_xlabel("predicted without integral (m)")
-    right.set_ylabel("error in x at rest (m)")
+    left.set(xlabel="predicted without integral (m)", ylabel="error in z at rest (m)")
+    right.set(xlabel="predicted without integral (m)", ylabel="error in x at rest (m)")
     return figure, {
         "in_runs": str(len(table)),
         "in_z_gap": f"{1000 * np.max(np.abs(error_z - np.abs(sag + offset))[~vertical]):.0e}",
@@ -224,8 +216,7 @@ def study_px4_ingredients(table: RunTable) -> tuple[Figure, dict[str, str]]:
     axes.plot(fine_lags, limits, color="#ffffff", linewidth=2, linestyle="--",
               label="linear: end of stability")
     axes.set_ylim(ages[0] - 0.015, ages[-1] + 0.015)
-    axes.set_xlabel("lag of the attitude (s)")
-    axes.set_ylabel("age of the states (s)")
+    axes.set(xlabel="lag of the attitude (s)", ylabel="age of the states (s)")
     axes.legend(loc="upper right", labelcolor="#ffffff")
     held = (outcome == 0)
     beyond = ages[:, None] > np.interp(lags, fine_lags, limits)[None, :]
