@@ -29,15 +29,29 @@ TEST_F(StopSignalDeathTest, NoSignalIsReportedBeforeTheFirst) {
       testing::ExitedWithCode(0), "");
 }
 
-TEST_F(StopSignalDeathTest, InterruptAndTerminateSetTheFlagOnly) {
-  for (const int number : {SIGINT, SIGTERM})
+TEST_F(StopSignalDeathTest, StopSignalsSetTheFlagOnlyAlsoIfTheyWereBlocked) {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP})
     EXPECT_EXIT(
         {
+          sigset_t blocked;
+          sigfillset(&blocked);
+          pthread_sigmask(SIG_BLOCK, &blocked, nullptr);
           install_stop_signals();
           std::raise(number);
           std::exit(stop_signal());
         },
         testing::ExitedWithCode(number), "");
+}
+
+TEST_F(StopSignalDeathTest, AHangUpIgnoredAtTheStartStaysIgnored) {
+  EXPECT_EXIT(
+      {
+        std::signal(SIGHUP, SIG_IGN);
+        install_stop_signals();
+        std::raise(SIGHUP);
+        std::exit(stop_signal());
+      },
+      testing::ExitedWithCode(0), "");
 }
 
 TEST_F(StopSignalDeathTest, TheFirstSignalCounts) {
