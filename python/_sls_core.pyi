@@ -1,7 +1,7 @@
 """Types of the extension module. Users import the package sls, which documents each name."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,141 +14,68 @@ Vector = tuple[float, float, float]
 class Vehicle:
     """Masses and rod of one vehicle of a scenario."""
 
-    @property
-    def quad_mass_kg(self) -> float: ...
-    @property
-    def load_mass_kg(self) -> float: ...
-    @property
-    def rod_length_m(self) -> float: ...
-    @property
-    def gravity_m_s2(self) -> float: ...
+    quad_mass_kg: float
+    load_mass_kg: float
+    rod_length_m: float
+    gravity_m_s2: float
 
 class Scenario:
     """All parameters of a flight. Made by sls.load_scenario."""
 
     def __init__(self, file: str | None = None, text: str = "", folder: str = "",
                  changes: Mapping[str, str] = ...) -> None: ...
-    @property
-    def text(self) -> str:
-        """The scenario as YAML. A file with this text in `folder` gives the same scenario."""
-    def to_text(self) -> str: ...
-    @property
-    def sha256(self) -> str: ...
-    @property
-    def name(self) -> str: ...
-    @property
-    def folder(self) -> str:
-        """Paths in the scenario are relative to it."""
-    @property
-    def period_s(self) -> float:
-        """Control period, s."""
-    @property
-    def step_s(self) -> float:
-        """Integration step of the plant, s."""
-    @property
-    def law(self) -> str: ...
-    @property
-    def plant(self) -> str: ...
-    @property
-    def vehicle(self) -> Vehicle: ...
-    @property
-    def vehicles(self) -> tuple[Vehicle, ...]:
-        """Every vehicle, by id."""
-    @property
-    def controller_model(self) -> Vehicle:
-        """The vehicle parameters that the controller uses."""
-    @property
-    def force_limit_n(self) -> float: ...
-    @property
-    def stages(self) -> tuple[tuple[str, str, float | None, float | None], ...]:
-        """The stages of the mission: (kind, name, for_s, lap_s) each."""
+    text: str  # YAML: a file with this text in `folder` gives the same scenario
+    sha256: str
+    name: str
+    folder: str  # paths in the scenario are relative to it
+    period_s: float  # control period, s
+    step_s: float  # integration step of the plant, s
+    law: str
+    plant: str
+    vehicle: Vehicle
+    vehicles: tuple[Vehicle, ...]  # every vehicle, by id
+    controller_model: Vehicle  # the vehicle parameters that the controller uses
+    force_limit_n: float
+    stages: tuple[tuple[str, str, float | None, float | None], ...]  # of the mission: (kind, name, for_s, lap_s)
 
-class Reference(tuple[Vector, ...]):
+class Reference(NamedTuple):
     """The desired motion of the load at one instant, as vectors in W."""
 
-    @property
-    def position(self) -> Vector:
-        """m"""
-    @property
-    def velocity(self) -> Vector:
-        """m/s"""
-    @property
-    def acceleration(self) -> Vector:
-        """m/s²"""
-    @property
-    def jerk(self) -> Vector:
-        """m/s³"""
-    @property
-    def snap(self) -> Vector:
-        """m/s⁴"""
+    position: Vector  # m
+    velocity: Vector  # m/s
+    acceleration: Vector  # m/s²
+    jerk: Vector  # m/s³
+    snap: Vector  # m/s⁴
 
-class Now(tuple[Any, ...]):
+class Now(NamedTuple):
     """The inputs of a control law, for one vehicle at one step. Frame W, z down."""
 
-    @property
-    def step(self) -> int:
-        """Number k of the control period, from 0."""
-    @property
-    def time_s(self) -> float: ...
-    @property
-    def period_s(self) -> float: ...
-    @property
-    def vehicle_id(self) -> int: ...
-    @property
-    def stage(self) -> int:
-        """Index into the mission."""
-    @property
-    def stage_time_s(self) -> float: ...
-    @property
-    def quad_position(self) -> Vector:
-        """m"""
-    @property
-    def quad_velocity(self) -> Vector:
-        """m/s"""
-    @property
-    def load_position(self) -> Vector:
-        """m"""
-    @property
-    def load_velocity(self) -> Vector:
-        """m/s"""
-    @property
-    def alpha(self) -> float:
-        """Angle of the rod about x, rad."""
-    @property
-    def beta(self) -> float:
-        """Angle of the rod about y, rad."""
-    @property
-    def alpha_rate(self) -> float:
-        """rad/s"""
-    @property
-    def beta_rate(self) -> float:
-        """rad/s"""
-    @property
-    def attitude(self) -> tuple[float, float, float, float] | None:
-        """Unit quaternion (w, x, y, z), body to W; None if the plant has no attitude."""
-    @property
-    def body_rates(self) -> Vector | None:
-        """In the body frame, rad/s; None if the plant has no attitude."""
-    @property
-    def signals(self) -> tuple[float, ...]:
-        """Signals of the plant, in the plant's order."""
-    @property
-    def reference(self) -> Reference: ...
-    @property
-    def memory(self) -> tuple[float, ...]:
-        """The memory that the law returned at the step before; zeros at step 0."""
+    step: int  # number k of the control period, from 0
+    time_s: float
+    period_s: float
+    vehicle_id: int
+    stage: int  # index into the mission
+    stage_time_s: float
+    quad_position: Vector  # m
+    quad_velocity: Vector  # m/s
+    load_position: Vector  # m
+    load_velocity: Vector  # m/s
+    alpha: float  # angle of the rod about x, rad
+    beta: float  # angle of the rod about y, rad
+    alpha_rate: float  # rad/s
+    beta_rate: float  # rad/s
+    attitude: tuple[float, float, float, float] | None  # w x y z, body to W; None if the plant has no attitude
+    body_rates: Vector | None  # in the body frame, rad/s; None if the plant has no attitude
+    signals: tuple[float, ...]  # signals of the plant, in the plant's order
+    reference: Reference
+    memory: tuple[float, ...]  # the memory that the law returned at the step before; zeros at step 0
 
 class FlightTable:
-    @property
-    def vehicle_ids(self) -> list[int]: ...
-    @property
-    def failure(self) -> str: ...
-    @property
-    def last_step(self) -> int: ...
-    @property
-    def columns(self) -> list[tuple[str, str, int, str]]: ...
-    @property
-    def certificate(self) -> str: ...
+    vehicle_ids: list[int]
+    failure: str
+    last_step: int
+    columns: list[tuple[str, str, int, str]]
+    certificate: str
     def can_measurement_differ(self, index: int) -> bool: ...
     def rows(self, index: int) -> np.ndarray: ...
     def save(self, folder: str, force: bool) -> bool: ...
@@ -162,16 +89,11 @@ class Batch:
               values: Mapping[str, np.ndarray]) -> None: ...
     def calc_reference(self, times: np.ndarray) -> tuple[np.ndarray, ...]: ...
     def failure(self, loop: int) -> str: ...
-    @property
-    def truth(self) -> dict[str, np.ndarray]: ...
-    @property
-    def measured(self) -> dict[str, np.ndarray]: ...
-    @property
-    def counters(self) -> dict[str, np.ndarray]: ...
-    @property
-    def constants(self) -> dict[str, Any]: ...
-    @property
-    def signal_names(self) -> list[str]: ...
+    truth: dict[str, np.ndarray]
+    measured: dict[str, np.ndarray]
+    counters: dict[str, np.ndarray]
+    constants: dict[str, Any]
+    signal_names: list[str]
 
 class Cables:
     def __init__(self, vehicle_mass: np.ndarray, length: np.ndarray, attachment: np.ndarray,

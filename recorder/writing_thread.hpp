@@ -4,7 +4,6 @@
 #include <chrono>
 #include <cstdint>
 #include <exception>
-#include <string>
 #include <thread>
 
 #include "common/bus/participants.hpp"

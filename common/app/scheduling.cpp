@@ -3,7 +3,6 @@
 #include <sched.h>
 #include <sys/resource.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <system_error>
 

@@ -39,7 +39,7 @@ constexpr const char* find_writer_profile(Flow flow) {
                                  : kLatchedWriterProfile;
 }
 
-/// The topics by number, in the order of kTopicNames.
+/// The topics by number.
 enum class TopicId {
   kState,
   kCommand,
@@ -52,63 +52,36 @@ enum class TopicId {
 };
 inline constexpr std::size_t kTopics = 8;
 
-/// `kId`, `kName` and `kFlow` of the topic that carries `Message`.
+/// The names of all topics of the contract, by their numbers.
+inline constexpr const char* kTopicNames[kTopics] = {
+    "sls/state",      "sls/command", "sls/record",  "sls/participant",
+    "sls/parameters", "sls/status",  "sls/control", "sls/control_reply"};
+
+template <TopicId kTopic, Flow kOf>
+struct TopicOf {
+  static constexpr TopicId kId = kTopic;
+  static constexpr const char* kName = kTopicNames[static_cast<std::size_t>(kTopic)];
+  static constexpr Flow kFlow = kOf;
+};
+
+/// The topic that carries `Message`.
 template <class Message>
 struct Topic;
-
 template <>
-struct Topic<States> {
-  static constexpr TopicId kId = TopicId::kState;
-  static constexpr const char* kName = "sls/state";
-  static constexpr Flow kFlow = Flow::kLoop;
-};
+struct Topic<States> : TopicOf<TopicId::kState, Flow::kLoop> {};
 template <>
-struct Topic<Commands> {
-  static constexpr TopicId kId = TopicId::kCommand;
-  static constexpr const char* kName = "sls/command";
-  static constexpr Flow kFlow = Flow::kLoop;
-};
+struct Topic<Commands> : TopicOf<TopicId::kCommand, Flow::kLoop> {};
 template <>
-struct Topic<RecordBatch> {
-  static constexpr TopicId kId = TopicId::kRecord;
-  static constexpr const char* kName = "sls/record";
-  static constexpr Flow kFlow = Flow::kRecord;
-};
+struct Topic<RecordBatch> : TopicOf<TopicId::kRecord, Flow::kRecord> {};
 template <>
-struct Topic<Participant> {
-  static constexpr TopicId kId = TopicId::kParticipant;
-  static constexpr const char* kName = "sls/participant";
-  static constexpr Flow kFlow = Flow::kLatched;
-};
+struct Topic<Participant> : TopicOf<TopicId::kParticipant, Flow::kLatched> {};
 template <>
-struct Topic<Parameters> {
-  static constexpr TopicId kId = TopicId::kParameters;
-  static constexpr const char* kName = "sls/parameters";
-  static constexpr Flow kFlow = Flow::kLatched;
-};
+struct Topic<Parameters> : TopicOf<TopicId::kParameters, Flow::kLatched> {};
 template <>
-struct Topic<SimStatus> {
-  static constexpr TopicId kId = TopicId::kStatus;
-  static constexpr const char* kName = "sls/status";
-  static constexpr Flow kFlow = Flow::kLatched;
-};
+struct Topic<SimStatus> : TopicOf<TopicId::kStatus, Flow::kLatched> {};
 template <>
-struct Topic<SimControl> {
-  static constexpr TopicId kId = TopicId::kControl;
-  static constexpr const char* kName = "sls/control";
-  static constexpr Flow kFlow = Flow::kLatched;
-};
+struct Topic<SimControl> : TopicOf<TopicId::kControl, Flow::kLatched> {};
 template <>
-struct Topic<SimControlReply> {
-  static constexpr TopicId kId = TopicId::kControlReply;
-  static constexpr const char* kName = "sls/control_reply";
-  static constexpr Flow kFlow = Flow::kLatched;
-};
-
-/// The names of all topics of the contract.
-inline constexpr const char* kTopicNames[kTopics] = {
-    Topic<States>::kName,      Topic<Commands>::kName,       Topic<RecordBatch>::kName,
-    Topic<Participant>::kName, Topic<Parameters>::kName,     Topic<SimStatus>::kName,
-    Topic<SimControl>::kName,  Topic<SimControlReply>::kName};
+struct Topic<SimControlReply> : TopicOf<TopicId::kControlReply, Flow::kLatched> {};
 
 }  // namespace sls::bus

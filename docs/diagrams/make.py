@@ -4,7 +4,7 @@
     docs/diagrams/make.py [NAME…]        all of them by default
 
 Each SVG says in its last line from which text it was drawn; tests/docs/architecture_test.py compares. The layers
-(layers.dot) are themselves made from the rules in tests/includes_test.cpp.
+(layers.dot) are themselves made from the rules in tests/includes_test.py.
 """
 
 import hashlib
@@ -16,6 +16,8 @@ import sys
 FOLDER = pathlib.Path(__file__).resolve().parent
 ROOT = FOLDER.parents[1]
 STYLE = FOLDER / "style.puml"  # which every .puml includes
+sys.path.append(str(ROOT / "tests"))
+from includes_test import RULES  # noqa: E402
 
 
 def list_sources():
@@ -28,14 +30,6 @@ def calc_mark(source):
     """The line that its SVG ends with."""
     text = source.read_bytes() + (STYLE.read_bytes() if source.suffix == ".puml" else b"")
     return f"<!-- drawn from {source.name}, SHA-256 {hashlib.sha256(text).hexdigest()} -->"
-
-
-def read_rules():
-    """{folder: what it may include beside its own files}, from tests/includes_test.cpp."""
-    text = (ROOT / "tests/includes_test.cpp").read_text()
-    table = re.search(r"kRules = \{(.*?)\n\};", text, re.DOTALL)[1]
-    rules = re.findall(r'\{"([^"]+)",\s*\{([^}]*)\}\}', table)
-    return {folder: re.findall(r'"([^"]+)"', others) for folder, others in rules}
 
 
 # Which folders the picture shows, in rows from top to bottom. tools/ and bench/ are not shown.
@@ -55,21 +49,20 @@ LIBRARIES = ["Fast DDS", "Simbody"]
 def draw_layers():
     """The text of layers.dot. An arrow leads from a folder to what it may include; what follows from other arrows
     is left out."""
-    rules = read_rules()
     shown = [folder for row in ROWS for folder in row]
     below = {}
     for folder in shown:
-        others = {name for name in shown for other in rules[folder]
+        others = {name for name in shown for other in RULES[folder]
                   if name != folder and (name == other or name.startswith(other + "/"))}
         others |= {name for name in shown if name.startswith(folder + "/")}
-        below[folder] = others | (set(rules[folder]) & set(LIBRARIES))
+        below[folder] = others | (set(RULES[folder]) & set(LIBRARIES))
     edges = []
     for folder in shown:
         implied = set()
         for other in below[folder] & set(shown):
             implied |= below[other] - {folder}
         edges += [(folder, other) for other in sorted(below[folder] - implied)]
-    lines = ["// Made by docs/diagrams/make.py from the rules in tests/includes_test.cpp. Do not edit.",
+    lines = ["// Made by docs/diagrams/make.py from the rules in tests/includes_test.py. Do not edit.",
              "digraph layers {",
              '  graph [rankdir=TB, fontname="Helvetica", bgcolor=white, nodesep=0.3, ranksep=0.5, pad=0.2]',
              '  node [shape=box, style="rounded,filled", fontname="Helvetica", fontsize=12, fillcolor="#eef4fb", '

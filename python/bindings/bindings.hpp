@@ -13,10 +13,9 @@ namespace sls::python {
 /// the other parts are added.
 void add_errors(pybind11::module_& module);
 
-/// The classes of sls/errors.py, as borrowed references. The caller must hold the GIL.
-pybind11::handle config_error_type();
-pybind11::handle run_error_type();
-pybind11::handle law_fault_type();
+/// The class `name` of sls/errors.py, as a borrowed reference. The caller must hold the GIL. The
+/// classes are defined in Python, because code that runs without this module raises them, too.
+pybind11::handle find_error_type(const char* name);
 
 /// Runs Python's handlers of the signals that have arrived, such as Ctrl-C. The caller must hold
 /// the GIL.

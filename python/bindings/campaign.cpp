@@ -24,7 +24,7 @@ class SignalCheck {
     if (now - last_ < kInterval) return;
     last_ = now;
     const py::gil_scoped_acquire lock;
-    if (PyErr_CheckSignals() != 0) throw py::error_already_set();
+    check_signals();
   }
 
  private:

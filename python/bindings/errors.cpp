@@ -14,13 +14,6 @@ namespace {
 
 namespace py = pybind11;
 
-/// The class `name` of sls/errors.py. The classes are defined in Python, because code that runs
-/// without this module raises them, too.
-py::handle find_type(const char* name) {
-  static const py::handle module = py::module_::import("sls.errors").release();
-  return py::object(module.attr(name)).release();  // never freed
-}
-
 void raise_os_error(const std::system_error& error) {
   // The text, which has the place and the cause, is the only argument: with two arguments Python
   // would print [Errno …] before it.
@@ -34,31 +27,21 @@ void translate(std::exception_ptr thrown) {
   try {
     std::rethrow_exception(thrown);
   } catch (const config::ConfigError& error) {
-    PyErr_SetString(config_error_type().ptr(), error.what());
+    PyErr_SetString(find_error_type("ConfigError").ptr(), error.what());
   } catch (const std::system_error& error) {
     raise_os_error(error);
   } catch (const app::RunError& error) {
-    PyErr_SetString(run_error_type().ptr(), error.what());
+    PyErr_SetString(find_error_type("RunError").ptr(), error.what());
   } catch (const record::DamagedError& error) {
-    PyErr_SetString(run_error_type().ptr(), error.what());
+    PyErr_SetString(find_error_type("RunError").ptr(), error.what());
   }
 }
 
 }  // namespace
 
-py::handle config_error_type() {
-  static const py::handle type = find_type("ConfigError");
-  return type;
-}
-
-py::handle run_error_type() {
-  static const py::handle type = find_type("RunError");
-  return type;
-}
-
-py::handle law_fault_type() {
-  static const py::handle type = find_type("LawFault");
-  return type;
+py::handle find_error_type(const char* name) {
+  static const py::handle module = py::module_::import("sls.errors").release();
+  return py::object(module.attr(name)).ptr();  // the module owns it
 }
 
 void check_signals() {
@@ -66,8 +49,8 @@ void check_signals() {
 }
 
 void add_errors(py::module_& module) {
-  module.attr("ConfigError") = config_error_type();
-  module.attr("RunError") = run_error_type();
+  module.attr("ConfigError") = find_error_type("ConfigError");
+  module.attr("RunError") = find_error_type("RunError");
   py::register_local_exception_translator(translate);
 }
 

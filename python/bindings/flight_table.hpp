@@ -13,7 +13,6 @@
 #include "closed_loop/flight_recorder.hpp"
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
-#include "python/bindings/row_buffer.hpp"
 
 namespace sls::python {
 
@@ -26,6 +25,27 @@ struct ColumnPlace {
   std::string name;   ///< as in the file
   std::size_t index;  ///< of the column's cell in a row
   Kind kind = Kind::kDouble;
+};
+
+/// The rows of a vehicle in one block of memory. A cell has 8 bytes: a double or an integer.
+class RowBuffer {
+ public:
+  /// `rows`: expected number of rows.
+  RowBuffer(std::size_t width, std::size_t rows) : width_(width) { cells_.reserve(rows * width); }
+
+  /// Adds a row and returns it. The pointer is valid until the next call.
+  double* add_row() {
+    cells_.resize(cells_.size() + width_);
+    return cells_.data() + cells_.size() - width_;
+  }
+
+  std::size_t width() const { return width_; }
+  std::size_t rows() const { return cells_.size() / width_; }
+  const double* row(std::size_t index) const { return cells_.data() + index * width_; }
+
+ private:
+  std::size_t width_;
+  std::vector<double> cells_;
 };
 
 class FlightTable {

@@ -177,9 +177,9 @@ void LawErrors::raise_first() {
     PyErr_SetObject(py::type::handle_of(cause_).ptr(), cause_.ptr());
     throw py::error_already_set();
   }
-  const py::object raised = run_error_type()(text_);
+  const py::object raised = find_error_type("RunError")(text_);
   if (cause_) raised.attr("__cause__") = cause_;
-  PyErr_SetObject(run_error_type().ptr(), raised.ptr());
+  PyErr_SetObject(find_error_type("RunError").ptr(), raised.ptr());
   throw py::error_already_set();
 }
 
@@ -225,7 +225,7 @@ LawOutput PythonLaw::calc(const LawInput& input) const {
   } catch (py::error_already_set& error) {
     // The memory keeps its size: all answers to a sample must have the same size.
     output.memory.setZero(memory_size_);
-    if (error.matches(law_fault_type())) {
+    if (error.matches(find_error_type("LawFault"))) {
       output.error_code = to_error_code(py::str(error.value().attr("code")));
       return output;
     }

@@ -78,8 +78,6 @@ void add_scenario(py::module_& module) {
            "A scenario from a file, or from a text whose paths are relative to a folder; changes: "
            "YAML values by path. Raises ConfigError.")
       .def_readonly("text", &Scenario::text, "YAML: a file with this text is the same scenario.")
-      .def(
-          "to_text", [](const Scenario& scenario) { return scenario.text; }, "The same.")
       .def_readonly("sha256", &Scenario::sha256, "Of the text, 64 lower-case hex digits.")
       .def_readonly("name", &Scenario::name)
       .def_property_readonly(

@@ -8,29 +8,20 @@ import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NoReturn
 
 if __name__ == "__main__":  # before the imports, which take most of the time
     signal.signal(signal.SIGINT, lambda *_: (os.write(2, b"sls: interrupted\n"), os._exit(130)))
 
 from sls import study
+from sls.campaign.arguments import Parser
 from sls.errors import ConfigError, RunError
 from sls.figures import PAPER, STYLE, make_figures, save
 from sls.trajectory import Trajectory
 from sls.input_error import InputError
+from sls.launcher.place import say
 from sls.published_logs import FORMATS, load_log
 from sls.recordings import Recording
 from sls.report import make_report
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        place = f"{self.prog.removeprefix('./sls ')}: " if self.prog != "./sls" else ""
-        raise InputError(f"{place}{message} (see {self.prog} --help)")
-
-
-def say(text: str) -> None:
-    print(f"sls: {text}", file=sys.stderr)
 
 
 def make_folder(folder: Path) -> None:

@@ -7,14 +7,7 @@ optimisation.
         error = loop.reference().position - state.load_position
         state = loop.step(my_forces(state, error))       # (256, 3) float64
 
-Vehicles on one load fly together. Forces of the scenario's law may stand beside your own:
-
-    loop = sls.ClosedLoop("three_carry_a_triangle")
-    for _ in range(1000):
-        force = loop.law_force()                         # (1, 3, 3): loop, vehicle, axis
-        force[:, 0] += (0.1, 0, 0)                       # or your own for vehicle 0
-        state = loop.step(force)
-"""
+Vehicles on one load fly together; python/README.md has an example."""
 
 from __future__ import annotations
 

@@ -114,8 +114,3 @@ def read_records(path: Path) -> list[dict[str, str]]:
     """The rows of a small CSV file. Its fields may be any text. Raises InputError."""
     text = read_text(path)
     return list(csv.DictReader(io.StringIO("\n".join(text.lines))))
-
-
-def stack(table: np.ndarray, names: Sequence[str]) -> np.ndarray:
-    """The columns `names` side by side, (n, len(names))."""
-    return np.column_stack([table[name] for name in names])

@@ -1,4 +1,4 @@
-"""DDS domains for flights that no other program shall disturb."""
+"""DDS domains for flights that no other program may disturb."""
 
 import re
 import socket

@@ -431,7 +431,6 @@ def plot_cables(flights: Sequence[Trajectory]) -> Figure:
 
 
 def plot_load_attitude(flights: Sequence[Trajectory]) -> Figure:
-    """Of a rigid load on cables."""
     figure, axes = make_stack(3, "Attitude of the load", ("roll (°)", "pitch (°)", "yaw (°)"), height=1.55)
     rigid = [flight for flight in flights if flight.cable and np.any(flight.cable.q_WL[:, 1:])]
     draw_columns(axes[:, 0], rigid, lambda flight: np.degrees(break_at_turns(

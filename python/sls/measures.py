@@ -91,7 +91,7 @@ class Rows:
         return self.vehicle.trajectory.calc_error()[self.rows]
 
     def calc_quad_error(self) -> np.ndarray:
-        """Position of the quadrotor minus that at which the load follows its reference, (n, 3), m."""
+        """Position of the quadrotor minus the one with which the load follows its reference exactly, (n, 3), m."""
         steps = self.vehicle.state["step"][self.rows]
         acceleration = align(steps, self.vehicle.reference, ("ref_ax_m_s2", "ref_ay_m_s2", "ref_az_m_s2"))
         wanted = load_core().calc_quad_reference(self.vehicle.trajectory.p_WL_ref[self.rows], acceleration, self.model)
@@ -193,7 +193,7 @@ def pick_share(chosen: Rows, is_hit: np.ndarray, whole: float) -> Measured:
 
 
 def find_late(chosen: Rows) -> np.ndarray:
-    """True for each row of state.csv whose answer did not come in time: a force is held, or the server's acts."""
+    """True for each row of state.csv without an answer in time: the last force or the fail-safe force acts."""
     command = chosen.vehicle.command
     late = command["step"][np.isin(command["fault"], ("held", "fail_safe"))]
     return np.isin(chosen.vehicle.state["step"], late)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sls.csv_tables import Text, is_number, parse_rows, read_text, stack
+from sls.csv_tables import Text, is_number, parse_rows, read_text
 from sls.trajectory import Trajectory, calc_rod
 from sls.input_error import InputError
 
@@ -77,7 +77,7 @@ def load_log(path: Path, name: str, format_name: str | None = None,
 def make_flight(table: np.ndarray, layout: LogFormat, name: str, rod_length_m: float) -> Trajectory:
     def vectors(columns: tuple[str, ...]) -> np.ndarray:
         if columns[0] in layout.columns:
-            return stack(table, columns)
+            return np.column_stack([table[name] for name in columns])
         return np.full((len(table), len(columns)), np.nan)
 
     alpha, beta = layout.alpha_sign * table["alpha"], table["beta"]

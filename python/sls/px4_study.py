@@ -100,9 +100,9 @@ def step_gently(scenario: dict[str, Any]) -> None:
 INGREDIENTS = (
     ("px4_ideal", "4 ms, the force acts at once", "0.0005, 0.0008, 0.0001"),
     ("px4_hold", "period 20 ms", "0.001, 0.004, 0"),
-    ("px4_stale", "old states, late command", "0.011, 0.037, 0.002"),
+    ("px4_stale", "delayed states, late command", "0.011, 0.037, 0.002"),
     ("px4_attitude", "rotors and attitude loop", "0.020, 0.074, 0"),
-    ("px4_offset", "told z −0.6", "0, 0, 0.100"),
+    ("px4_offset", "commanded z −0.6", "0, 0, 0.100"),
     ("px4_tilt_yaw", "tilt and yaw error", "0.109, 0.232, 0.001"),
     ("px4_published", "all but tilt and yaw error", "0.037, 0.156, 0.097"),
     ("px4_fitted", "all", "0.118, 0.285, 0.097"),
@@ -113,14 +113,14 @@ ATTITUDE_LAG_S = 0.154
 
 BOUGHT = (
     (Planned("fitted_exact_thrust", "px4_fitted", (use_exact_thrust,)), "exact thrust map"),
-    (Planned("fitted_fresh", "px4_fitted", (see_at_once,)), "fresh states, prompt command"),
+    (Planned("fitted_fresh", "px4_fitted", (see_at_once,)), "no delay of states and command"),
     (Planned("fitted_exact_fresh", "px4_fitted", (use_exact_thrust, see_at_once)), "both"),
     (Planned("published_exact_fresh", "px4_published", (use_exact_thrust, see_at_once)),
      "both, and no tilt and yaw error"),
     (Planned("fitted_right_gains", "px4_fitted", (use_right_gains,)), "gains in the right order"),
     (Planned("fitted_exact_fresh_right_gains", "px4_fitted",
              (use_exact_thrust, see_at_once, use_right_gains)),
-     "exact thrust map, fresh, gains in the right order"),
+     "exact thrust map, no delays, gains in the right order"),
     (Planned("fitted_first_order", "px4_fitted", (lag_first_order(ATTITUDE_LAG_S),)),
      f"a lag of {ATTITUDE_LAG_S} s for rotors and attitude loop, exact thrust"),
 )
@@ -343,11 +343,7 @@ def measure_step(flight: Trajectory, angle: int) -> StepResponse:
 def cut_eight(flight: Trajectory, name: str) -> Trajectory:
     """Both laps as a separate flight that starts at time 0."""
     stage = next(stage for stage in flight.stages if stage.lap_s is not None)
-    rows = np.arange(stage.first, stage.end)
-    return replace(flight, name=name, time_s=flight.time_s[rows] - flight.time_s[rows[0]],
-                   p_WQ=flight.p_WQ[rows], p_WL=flight.p_WL[rows], p_WL_ref=flight.p_WL_ref[rows],
-                   alpha=flight.alpha[rows], beta=flight.beta[rows], f_Q_W=flight.f_Q_W[rows],
-                   stages=(), body=None)
+    return flight.cut(np.arange(stage.first, stage.end), name)
 
 
 def plot_plan(flights: Sequence[Trajectory]) -> Figure:
@@ -456,7 +452,7 @@ def make_bought_table(flown: dict[str, Flown]) -> str:
     listed = [("px4_fitted", "`px4_fitted`"),
               ("px4_published", "no tilt and yaw error (`px4_published`)"), *((planned.name, text) for planned, text in BOUGHT)]
     return make_markdown_table(
-        ("`px4_fitted` with … (second lap, true, z as told)", *ERROR_HEADER),
+        ("`px4_fitted` with … (second lap, true, z as commanded)", *ERROR_HEADER),
         [[text, *list_error_cells(measure(flown[name].true))] for name, text in listed])
 
 

@@ -1,6 +1,6 @@
 """pytest's plug-in: checks as tests, and servers for tests. python/README.md, "pytest", shows the use.
 
-Everything of the package is imported late, since pytest loads the plug-in also for tests that do not fly."""
+The package's other modules are imported late, because pytest loads the plug-in also for tests that do not fly."""
 
 import os
 import re
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 KEYS = ("check", "placements", "under", "judge")
 PATIENCE_S = 30.0  # a program exits at the latest 20 s after its stop signal
-RESULT = pytest.StashKey["tuple[Check, Result]"]()
+RESULT = pytest.StashKey["Result"]()
 COMPARISON = pytest.StashKey["Comparison"]()
 
 
@@ -101,7 +101,7 @@ def sls_flight(request: pytest.FixtureRequest, sls_case: "tuple[Check, str]", sl
     check, placement = sls_case
     result = fly_and_judge(Job(check, placement, sls_network, 1, 1, tmp_path / "flight"))
     request.config.stash.setdefault(COMPARISON, Comparison(True)).compare(check, result)
-    request.node.stash[RESULT] = check, result
+    request.node.stash[RESULT] = result
     if result.verdict == UNUSABLE:
         fail("\n".join(result.list_problems()))
     return result
@@ -111,13 +111,13 @@ def sls_flight(request: pytest.FixtureRequest, sls_case: "tuple[Check, str]", sl
 def pytest_runtest_call(item: pytest.Item) -> None:
     """Fails the test before its body if an expectation does not hold."""
     if RESULT in item.stash and item.get_closest_marker("sls").kwargs.get("judge", True):
-        if problems := item.stash[RESULT][1].list_problems():
+        if problems := item.stash[RESULT].list_problems():
             fail("\n".join(problems))
 
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: "pytest.CallInfo[None]") -> Iterator[None]:
-    """Gives the report of a failed test what the flight left, and JUnit the same as properties."""
+    """Adds page, difference and output of the flight to the report of a failed test, and to JUnit as properties."""
     is_failed = call.excinfo and call.when != "teardown" and not call.excinfo.errisinstance(pytest.skip.Exception)
     found = describe_flight(item) if is_failed and RESULT in item.stash else []
     item.user_properties += [(f"sls_{name}", text) for name, text in found if name != "output"]
@@ -126,12 +126,12 @@ def pytest_runtest_makereport(item: pytest.Item, call: "pytest.CallInfo[None]") 
 
 
 def describe_flight(item: pytest.Item) -> list[tuple[str, str]]:
-    """Makes the page of a flight that failed. Returns what the report shall say of it."""
-    check, result = item.stash[RESULT]
+    """Makes the page of a failed flight. Returns the titles and texts of its sections in the report."""
+    result = item.stash[RESULT]
     folder = item.config.getoption("--sls-report") or Path(result.folder).parent
     try:
         from sls.check.pages import write_page
-        write_page(folder.resolve() / re.sub(r"[^\w.-]+", "-", item.nodeid), check, result)
+        write_page(folder.resolve() / re.sub(r"[^\w.-]+", "-", item.nodeid), result)
     except (ImportError, OSError) as error:
         result.page = f"none: {error}"
     logs = "\n".join(f"{name}: {line}" for name, text in result.logs.items() for line in text.splitlines())

@@ -39,6 +39,7 @@ CAPTIONS = {
     "load_attitude": "Attitude of the load.",
 }
 MOST_EVENTS = 200
+TEXT = " class=\"text\""  # of a table whose cells are texts
 # Columns of status.csv that are not counters.
 NO_COUNTERS = ("sample_index", "phase", "reason", "step", "controller", "real_time_factor",
                "round_trip_p50_us", "round_trip_p99_us", "timing", "problem")
@@ -141,11 +142,12 @@ def make_report(recording: Recording, vehicle_id: int, first: Sequence[str] = ()
     return join_page(title, [*sections[:2], scene, *sections[2:]])
 
 
-def join_page(title: str, sections: Sequence[str]) -> str:
+def join_page(title: str, sections: Sequence[str], kind: str = "flight report", style: str = "") -> str:
+    """The page of these sections. `style`: more rules of CSS."""
     return ("<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\">\n"
             "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
             "<link rel=\"icon\" href=\"data:,\">\n"
-            f"<title>{escape(title)}: flight report</title>\n<style>{STYLE_SHEET}</style></head>\n"
+            f"<title>{escape(title)}: {kind}</title>\n<style>{STYLE_SHEET}{style}</style></head>\n"
             f"<body><main>\n{''.join(sections)}</main></body>\n</html>\n")
 
 
@@ -155,6 +157,14 @@ def escape(value: Any) -> str:
 
 def make_section(title: str, content: str) -> str:
     return f"<section><h2>{title}</h2>{content}</section>\n"
+
+
+def make_plain_table(header: Sequence[str], rows: Sequence[Sequence[str]], style: str = "") -> str:
+    """An HTML table. `header` and `rows` hold HTML; `style`: attributes of the table."""
+    head = "".join(f"<th>{cell}</th>" for cell in header)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    return (f"<div class=\"scroll\"><table{style}><thead><tr>{head}</tr></thead><tbody>{body}"
+            "</tbody></table></div>")
 
 
 def make_head(recording: Recording, flight: Trajectory, title: str) -> str:
@@ -169,11 +179,16 @@ def make_head(recording: Recording, flight: Trajectory, title: str) -> str:
             + (f"<ul class=\"notes\">{notes}</ul>" if notes else "") + "</header>\n")
 
 
+def make_fact_list(facts: Sequence[tuple[str, Any]]) -> str:
+    entries = "".join(f"<div><dt>{escape(key)}</dt><dd>{escape(value)}</dd></div>" for key, value in facts)
+    return f"<dl class=\"facts\">{entries}</dl>"
+
+
 def make_facts(recording: Recording, flight: Trajectory, vehicle_id: int) -> str:
     manifest, scenario = recording.manifest, recording.scenario
     vehicle = find_vehicle(scenario, vehicle_id)
     model = scenario.get("controller", {}).get("model") or {}
-    facts = [
+    return make_fact_list([
         ("quadrotor mass", f"{vehicle.get('quad_mass_kg', '–')} kg"),
         ("load mass", describe_load_mass(scenario, vehicle, recording.vehicle_ids if flight.cable else [])),
         ("cable length" if flight.cable else "rod length", f"{vehicle.get('rod_length_m', '–')} m"),
@@ -192,10 +207,7 @@ def make_facts(recording: Recording, flight: Trajectory, vehicle_id: int) -> str
         ("programs", describe_programs(manifest)),
         ("machine", describe_machine(manifest.get("machine", {}))),
         ("certificate", manifest.get("certificate") or "–"),
-    ]
-    entries = "".join(f"<div><dt>{escape(key)}</dt><dd>{escape(value)}</dd></div>"
-                      for key, value in facts)
-    return f"<dl class=\"facts\">{entries}</dl>"
+    ])
 
 
 def find_vehicle(scenario: dict[str, Any], vehicle_id: int) -> dict[str, Any]:
@@ -238,15 +250,16 @@ def describe_machine(machine: dict[str, Any]) -> str:
                      if machine.get(key)) or "–"
 
 
-def make_table(groups: Sequence[str], rows: Sequence[list[str]]) -> str:
-    """A table with a row for each stage or lap, and three columns, x y z, for each group."""
+def make_table(groups: Sequence[str], rows: Sequence[list[str]],
+               first: Sequence[str] = ("stage", "from s", "to s")) -> str:
+    """A table with the columns `first` and, for each group, three columns, x y z."""
+    head = "".join(f"<th rowspan=\"2\">{name}</th>" for name in first)
     top = "".join(f"<th colspan=\"3\">{group}</th>" for group in groups)
     axes = "<th>x</th><th>y</th><th>z</th>" * len(groups)
     body = "".join(
         f"<tr{' class=lap' if cells[0].startswith('lap') else ''}>"
         + "".join(f"<td>{escape(cell)}</td>" for cell in cells) + "</tr>" for cells in rows)
-    return ("<div class=\"scroll\"><table><thead><tr><th rowspan=\"2\">stage</th>"
-            f"<th rowspan=\"2\">from s</th><th rowspan=\"2\">to s</th>{top}</tr><tr>{axes}</tr>"
+    return (f"<div class=\"scroll\"><table><thead><tr>{head}{top}</tr><tr>{axes}</tr>"
             f"</thead><tbody>{body}</tbody></table></div>")
 
 
@@ -279,7 +292,7 @@ def make_step_section(flight: Trajectory) -> str:
 
 
 def make_cable_section(fleet: Sequence[Trajectory]) -> str:
-    rows = ""
+    rows = []
     for flight in fleet:
         if flight.cable is None:
             return ""
@@ -290,31 +303,24 @@ def make_cable_section(fleet: Sequence[Trajectory]) -> str:
         numbers = [*([np.mean(pulls), np.max(pulls)] if len(pulls) else [np.nan, np.nan]),
                    sum(end - begin for begin, end in slack), len(slack), np.min(cable.length), np.max(cable.length),
                    cut[0][0] if cut else np.nan]
-        cells = [flight.name, *(f"{number:.4g}" if np.isfinite(number) else "–" for number in numbers)]
-        rows += "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+        rows.append([flight.name, *(f"{number:.4g}" if np.isfinite(number) else "–" for number in numbers)])
     names = ("vehicle", "mean tension (N)", "max tension (N)", "slack (s)", "times slack", "least length (m)",
              "greatest length (m)", "first cut at (s)")
-    head = "".join(f"<th>{name}</th>" for name in names)
-    return make_section("Cables", f"<div class=\"scroll\"><table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody>"
-                        "</table></div>")
+    return make_section("Cables", make_plain_table(names, rows))
 
 
 def make_fleet_section(fleet: Sequence[Trajectory]) -> str:
     if len(fleet) < 2:
         return ""
-    rows = ""
+    rows = []
     for flight in fleet:
         error = flight.calc_error()
         error = error[np.isfinite(error[:, 0])]
         if len(error):
-            cells = [flight.name, *map(format_error, np.concatenate(calc_errors(error)))]
-            rows += "<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>"
+            rows.append([flight.name, *map(format_error, np.concatenate(calc_errors(error)))])
     title = "Ends of all cables" if fleet[0].cable else "All vehicles"
     return (f"<section><details><summary>{title}, whole flight (m)</summary>"
-            "<div class=\"scroll\"><table><thead><tr><th rowspan=\"2\">vehicle</th>"
-            "<th colspan=\"3\">rms</th><th colspan=\"3\">max</th></tr><tr>"
-            + "<th>x</th><th>y</th><th>z</th>" * 2
-            + f"</tr></thead><tbody>{rows}</tbody></table></div></details></section>\n")
+            f"{make_table(('rms', 'max'), rows, ['vehicle'])}</details></section>\n")
 
 
 def make_figure_list(flight: Trajectory, fleet: Sequence[Trajectory], marks: Sequence[tuple[float, str]] = ()) -> str:
@@ -354,13 +360,11 @@ def add_dark_colours(svg: str) -> str:
 
 def make_events(recording: Recording) -> str:
     events = recording.list_events()
-    rows = "".join(f"<tr><td>{event.time_s:g}</td><td>{event.step}</td>"
-                   f"<td>{escape(event.text)}</td></tr>" for event in events[:MOST_EVENTS])
+    rows = [[f"{event.time_s:g}", str(event.step), escape(event.text)] for event in events[:MOST_EVENTS]]
     more = (f"<p class=\"small\">{len(events) - MOST_EVENTS} more are in status.csv.</p>"
             if len(events) > MOST_EVENTS else "")
     status = recording.read_last_status()
     counted = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in status.items()
                         if name not in NO_COUNTERS and count != "0")
-    return ("<div class=\"scroll\"><table class=\"text\"><thead><tr><th>time s</th><th>step</th>"
-            f"<th>what</th></tr></thead><tbody>{rows}</tbody></table></div>{more}"
+    return (f"{make_plain_table(('time s', 'step', 'what'), rows, TEXT)}{more}"
             f"<p class=\"small\">Counted by the server: {counted or 'nothing unusual'}.</p>")

@@ -45,15 +45,15 @@ def load_scenario(path_or_name: str | os.PathLike[str], *,
     named = {key.replace("__", "."): value for key, value in keys.items()}
     for path, value in {**(changes or {}), **named}.items():
         try:
-            replaced[path] = to_yaml(value)
+            replaced[path] = to_yaml_value(value)
         except (TypeError, ValueError) as error:
             raise ConfigError(f"{path_or_name}: {path}: {error}") from None
     return load_core().Scenario(file=str(find_scenario(path_or_name)), changes=replaced)
 
 
-def to_yaml(value: object) -> str:
-    """`value` as YAML in one line. Numbers have enough digits to read back the same number; texts are in
-    quotes, lists and maps in brackets; numpy's numbers and arrays are treated like Python's.
+def to_yaml_value(value: object) -> str:
+    """`value` as YAML in one line that reads back to the same bits. Texts are in quotes, lists and maps in brackets;
+    numpy's numbers and arrays are treated like Python's.
 
     Raises TypeError for other types, ValueError for a number that is not finite."""
     if isinstance(value, (np.generic, np.ndarray)):
@@ -63,15 +63,18 @@ def to_yaml(value: object) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, int):
-        return repr(value)
+        return str(value)
     if isinstance(value, float):
         if not math.isfinite(value):
             raise ValueError(f"expected a finite number, got {value}")
-        return repr(value)
+        text = repr(value)
+        # Readers of YAML 1.1, such as Python's, read 1e-07 as text and 1.0e-07 as a number.
+        return text if "." in text or "e" not in text else text.replace("e", ".0e")
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
+        return json.dumps(value, ensure_ascii=False)  # JSON is valid YAML
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {to_yaml(item)}" for key, item in value.items()) + "}"
+        keys = [key if str(key).isidentifier() else json.dumps(key, ensure_ascii=False) for key in value]
+        return "{" + ", ".join(f"{key}: {to_yaml_value(item)}" for key, item in zip(keys, value.values())) + "}"
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(to_yaml, value)) + "]"
+        return "[" + ", ".join(map(to_yaml_value, value)) + "]"
     raise TypeError(f"expected a number, a text, a list or a map, got {type(value).__name__}")

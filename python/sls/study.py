@@ -13,7 +13,7 @@ from sls import px4_study
 from sls.figures import STYLE, draw, lay_out, make_stack, plot_path, plot_positions, save, set_log_scale, style_of
 from sls.trajectory import Trajectory
 from sls.metrics import StageMetrics, calc_stage_metrics, split_laps
-from sls.px4_study import Planned, RunFailed, measure
+from sls.px4_study import Planned, RunFailed, measure, shift_to_published
 from sls.tables import (format_error, list_error_cells, list_step_cells, make_markdown_table)
 
 HERE = Path(__file__).resolve().parent
@@ -54,11 +54,7 @@ def fly_all(recordings: Path, say: Callable[[str], None]) -> None:
 def cut(flight: Trajectory, stage_name: str, lap: int, name: str) -> Trajectory:
     """One lap of a flight as a separate flight that starts at time 0."""
     stage = next(stage for stage in flight.stages if stage.name == stage_name)
-    rows = split_laps(flight, stage)[lap - 1].rows
-    return replace(flight, name=name, time_s=flight.time_s[rows] - flight.time_s[rows[0]],
-                   p_WQ=flight.p_WQ[rows], p_WL=flight.p_WL[rows],
-                   p_WL_ref=flight.p_WL_ref[rows], alpha=flight.alpha[rows],
-                   beta=flight.beta[rows], f_Q_W=flight.f_Q_W[rows], stages=())
+    return flight.cut(split_laps(flight, stage)[lap - 1].rows, name)
 
 
 def plot_error_sizes(flights: Sequence[Trajectory], title: str) -> Figure:
@@ -133,12 +129,6 @@ def make_lap_row(metrics: StageMetrics) -> list[str]:
     return [metrics.label, *list_error_cells(metrics)[:5]]
 
 
-def measure_about(flight: Trajectory, z_offset_m: float, label: str) -> StageMetrics:
-    """Metrics of the second lap with the reference shifted by `z_offset_m`."""
-    shifted = replace(flight, p_WL_ref=flight.p_WL_ref + np.array([0.0, 0.0, z_offset_m]))
-    return measure(shifted, label)
-
-
 LAP_HEADER = ("figure eight, second lap", *PUBLISHED_LAP_2[0][1:])
 STEP_HEADER = ("flight", "settling x s", "y", "z", "overshoot x %", "y", "z",
                "steady-state error x m", "y", "z")
@@ -150,11 +140,11 @@ def make_lap_table(flights: dict[str, Trajectory]) -> str:
         measure(flights["figure_eight_1ms"], "`figure_eight`, hold of 1 ms"),
         measure(flights["matlab_figure_eight"], "`matlab_figure_eight`, hold of 1 ms"),
         measure(flights["gazebo_legacy"], "`gazebo_legacy`: published wiring"),
-        measure_about(flights["gazebo_legacy"], 0.1, "`gazebo_legacy`, about z −0.5"),
+        measure(shift_to_published(flights["gazebo_legacy"], "gazebo_legacy"), "`gazebo_legacy`, about z −0.5"),
         measure(flights["gazebo_correct_wiring"],
-                      "`gazebo_correct_wiring`: only the wiring put right"),
+                      "`gazebo_correct_wiring`: only the wiring corrected"),
         measure(flights["gazebo_corrected"],
-                      "`gazebo_corrected`: and the controller's model"),
+                      "`gazebo_corrected`: wiring and controller model corrected"),
     ]
     rows = [[f"published: {row[0]}", *row[1:]] for row in PUBLISHED_LAP_2[1:]]
     return make_markdown_table(LAP_HEADER, [*rows, *map(make_lap_row, ours)])

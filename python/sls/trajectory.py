@@ -5,7 +5,7 @@ values that a source does not hold are NaN."""
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -54,20 +54,17 @@ class Body:
     rod_tension: np.ndarray
     """Of the rod or of the own cable, (n,), N."""
 
-    def take(self, rows: np.ndarray) -> "Body":
-        return Body(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
-
 
 @dataclass(frozen=True)
 class Cable:
-    """The own cable of a vehicle that carries one load, alone or with others, and that load."""
+    """The cable of a vehicle, and the load that this vehicle carries alone or with others."""
 
     tension: np.ndarray
     """(n,), N; NaN before the first step."""
     length: np.ndarray
     """(n,), m."""
     distance: np.ndarray
-    """Of its ends, (n,), m."""
+    """Distance of its ends, (n,), m."""
     is_slack: np.ndarray
     """(n,), neither taut nor cut."""
     is_cut: np.ndarray
@@ -104,6 +101,12 @@ class Trajectory:
     """None if the source has no attitude and no rotors."""
     cable: Cable | None = None
     """None for a rod."""
+
+    def cut(self, rows: np.ndarray, name: str) -> "Trajectory":
+        """These rows as a flight of its own, which starts at time 0, without stages, body and cable."""
+        columns = {key: getattr(self, key)[rows] for key in ("p_WQ", "p_WL", "p_WL_ref", "alpha", "beta", "f_Q_W")}
+        return replace(self, name=name, time_s=self.time_s[rows] - self.time_s[rows[0]], stages=(), body=None,
+                       cable=None, **columns)
 
     def calc_error(self) -> np.ndarray:
         """Load position error, (n, 3), m."""

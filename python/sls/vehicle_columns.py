@@ -1,4 +1,4 @@
-"""What a vehicle's flight offers beside its tables, whether flown in this process or read from a recording."""
+"""Vectors, metrics and figures of one vehicle, whether flown in this process or read from a recording."""
 
 from functools import cached_property
 from typing import TYPE_CHECKING

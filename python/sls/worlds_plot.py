@@ -1,4 +1,4 @@
-"""The picture of a search of worlds: what the network cost the flights."""
+"""The picture of `./sls worlds --plot`: duration and error of the flights over the loss of their links."""
 
 import argparse
 import csv

@@ -78,7 +78,7 @@ class Autopilot {
 std::unique_ptr<Autopilot> make_autopilot(const AutopilotSetup& setup);
 
 /// Attitude with the heading `yaw` whose −z axis points along `f_W`. `f_W` must not be zero.
-/// Source: docs/design.md, section 4, "commanded attitude", turned about z by the yaw.
+/// Source: common/model/README.md, eq. (8), turned about z by the yaw.
 Eigen::Quaterniond calc_attitude_for(const Eigen::Vector3d& f_W, double yaw = 0.0);
 
 /// Speeds at which each rotor gives the same share of `thrust` (N). Rotors that are alike then make

@@ -11,24 +11,16 @@ import sys
 import time
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = pathlib.Path(sys.argv.pop()).resolve() if __name__ == "__main__" else ROOT / "build"
-sys.path[:0] = [str(ROOT), str(ROOT / "tests/support")]
+from folder_test import FolderTest
+from places import BUILD, ROOT, launch
+from processes import wait_until
 
+sys.path.insert(0, str(ROOT))
 from bench import instructions, loop  # noqa: E402
 from bench.programs import Programs, wait_for  # noqa: E402
 from bench.results import LESS, Figure, Rounds, format_number, format_table  # noqa: E402
-from folder_test import FolderTest  # noqa: E402
 
 GOOGLE_BENCHMARK = BUILD / "bin/sls_microbench"
-
-
-def wait_until(condition):
-    deadline = time.monotonic() + 30
-    while not condition():
-        if time.monotonic() > deadline:
-            raise AssertionError("waited for 30 s")
-        time.sleep(0.01)
 
 
 def is_alive(process):
@@ -36,14 +28,6 @@ def is_alive(process):
         return ") Z " not in (process / "stat").read_text()
     except OSError:
         return False
-
-
-def bench(*words, check=0):
-    done = subprocess.run([ROOT / "sls", "bench", *map(str, words)], capture_output=True, text=True,
-                          env={**os.environ, "SLS_BUILD": str(BUILD)}, timeout=600, check=False)
-    if check is not None and done.returncode != check:
-        raise AssertionError(f"ended with {done.returncode}: {done.stdout}{done.stderr}")
-    return done
 
 
 class BoundTest(unittest.TestCase):
@@ -272,9 +256,9 @@ class ProcessTest(FolderTest):
                               stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)}
                               ) as process:
             counting = pathlib.Path(f"/proc/{int(process.stdout.readline())}")
-            wait_until(lambda: (counting / "comm").read_text() == "sh\n")  # setpriv has started the shell
+            wait_until(lambda: (counting / "comm").read_text() == "sh\n", 30, "setpriv has started the shell")
             process.kill()
-        wait_until(lambda: not is_alive(counting))
+        wait_until(lambda: not is_alive(counting), 30, "the loop has ended")
 
     def test_a_process_is_waited_for_with_the_processor_time_it_took(self):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -293,13 +277,13 @@ class ProgramTest(FolderTest):
         for words, cause in ((["--only", "nonsense"], "nonsense"), (["--nonsense"], "--nonsense"),
                              (["--only"], "--only"), (["--json", self.folder / "no/file"], "--json"),
                              (["--out", "/proc/none"], "--out")):
-            said = bench(*words, check=2).stderr
+            said = launch("bench", *words, code=2).stderr
             self.assertEqual(said.count("\n"), 1, said)
             self.assertIn("error: ", said)
             self.assertIn(cause, said)
 
     def test_help_names_every_part(self):
-        said = bench("--help").stdout
+        said = launch("bench", "--help").stdout
         for part in ("lockstep", "load", "realtime", "plant", "start", "instructions"):
             self.assertIn(part, said)
 
@@ -317,7 +301,7 @@ class ProgramTest(FolderTest):
 
     def test_a_quick_start_part_measures_a_short_flight_with_the_launcher_and_without(self):
         file = self.folder / "bench.json"
-        bench("--quick", "--only", "start", "--json", file)
+        launch("bench", "--quick", "--only", "start", "--json", file, timeout=600)
         figures = {figure["name"]: figure for figure in self.check(file, "start")}
         self.assertEqual({figure["goal"]["value"] for figure in figures.values() if "goal" in figure},
                          {0.8, 0.7, 0.6, 0.9})
@@ -332,7 +316,7 @@ class ProgramTest(FolderTest):
             words += ["--out", self.folder / "plots"]
         except ImportError:
             pass
-        said = bench(*words)
+        said = launch("bench", *words, timeout=600)
         figures = self.check(file, "lockstep")
         self.assertIn("shared memory, with recorder", said.stdout)
         self.assertIn("where a step goes", said.stdout)
@@ -356,24 +340,20 @@ class ProgramTest(FolderTest):
 
     def test_a_quick_load_part_compares_with_no_load_and_with_no_spinning(self):
         file = self.folder / "bench.json"
-        bench("--quick", "--only", "load", "--json", file)
+        launch("bench", "--quick", "--only", "load", "--json", file, timeout=600)
         names = [figure["name"] for figure in self.check(file, "load") if "ratio" in figure]
         self.assertEqual(sum("1 busy loop" in name for name in names), 3)
         self.assertEqual(sum("beside blocking" in name for name in names), 2)
 
     def test_a_quick_realtime_part_stands_beside_a_thread_that_only_sleeps(self):
         file = self.folder / "bench.json"
-        bench("--quick", "--only", "realtime", "--json", file)
+        launch("bench", "--quick", "--only", "realtime", "--json", file, timeout=600)
         late = [figure for figure in self.check(file, "realtime") if "ratio" in figure]
         self.assertEqual(len(late), 2 * len(loop.PERCENTILES))
 
     @unittest.skipUnless(GOOGLE_BENCHMARK.exists(), "skipped: libbenchmark-dev is missing")
     def test_a_quick_plant_part_compares_with_the_closed_form(self):
         file = self.folder / "bench.json"
-        bench("--quick", "--only", "plant", "--json", file)
+        launch("bench", "--quick", "--only", "plant", "--json", file, timeout=600)
         ratios = [figure for figure in self.check(file, "plant") if "ratio" in figure]
         self.assertEqual(len(ratios), 4)  # 1, 2, 10 and 100 vehicles
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -82,7 +82,8 @@ TEST(DelayMarginTest, OnlyDelaysOfTheWholeFlightAreTheScenariosOwn) {
   add(config::FaultChannel::kCommand, 8'000'000, 0);
   add(config::FaultChannel::kState, 4'000'000, 0);
   add(config::FaultChannel::kCommand, 4'000'000, 1'000'000'000);
-  EXPECT_EQ(find_delay_margin(scenario).own_ns, 12'000'000);
+  scenario.sensing.node_delay_ns = 1'000'000;
+  EXPECT_EQ(find_delay_margin(scenario).own_ns, 13'000'000);
 }
 
 TEST(DelayMarginTest, SmallMotionsAboutHoverGrowFromTheDelayOfLinearTheoryOn) {

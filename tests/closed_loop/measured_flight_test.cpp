@@ -206,58 +206,14 @@ TEST(FlightMeasuresTest, CoverTheFlightUpToTheFailureOnly) {
   expect_measures_of_its_columns(stuck, base);
 }
 
-TEST(FlightMeasuresTest, AStepByHandHasTheMeasuresOfItsFormulas) {
-  // Load from 0 to 1 m over 0.5, 1.2, 0.99, 0.97, 1.01, 1 m: overshoot 20 %, settled at step 5.
-  const config::Scenario base = load("setpoints");
-  const MeasureList list(base, {"settling", "overshoot", "force_max", "tilt_max"});
-  FlightMeasures measures(list, 10'000'000, base.vehicle, false);
-  std::uint64_t number = 0;
-  for (const double x : {0.0, 0.5, 1.2, 0.99, 0.97, 1.01, 1.0}) {
-    model::StepRecord step;
-    step.step = number++;
-    step.answer.reference.position << 1.0, 0.0, 0.0;
-    step.truth.p_WL << x, 0.0, 0.0;
-    step.truth.p_WQ << x + 3.0 * static_cast<double>(step.step == 3), 0.0, -4.0;
-    step.answer.f_Q_W << 0.0, 3.0, step.step == 2 ? -4.0 : -1.0;
-    measures.add(step);
-  }
-  const std::vector<double> values = measures.finish(std::nullopt);
-  std::map<std::string, double> by_name;
-  for (std::size_t i = 0; i < values.size(); ++i) by_name[list.columns()[i]] = values[i];
-  EXPECT_DOUBLE_EQ(by_name.at("stage_0_settling_x_s"), 0.05);
-  EXPECT_DOUBLE_EQ(by_name.at("stage_0_overshoot_x"), 0.2);
-  EXPECT_TRUE(std::isnan(by_name.at("stage_0_settling_y_s"))) << "there is no step";
-  EXPECT_TRUE(std::isnan(by_name.at("stage_1_overshoot_x"))) << "was not flown";
-  EXPECT_DOUBLE_EQ(by_name.at("force_max_n"), 5.0);
-  EXPECT_DOUBLE_EQ(by_name.at("tilt_max_rad"), std::atan2(3.0, 4.0));
-}
-
 TEST(FlightMeasuresTest, ListsColumnsInTheOrderOfTheMeasures) {
   const config::Scenario base = load("mission");  // its stage 4 is a figure eight
-  EXPECT_EQ(MeasureList(base, {"time_of_loss", "outcome", "load_error_rms"}).columns(),
-            (std::vector<std::string>{"time_of_loss_s",
-                                      "load_error_rms_m",
-                                      "load_error_rms_x_m",
-                                      "load_error_rms_y_m",
-                                      "load_error_rms_z_m",
-                                      "stage_0_load_error_rms_x_m",
-                                      "stage_0_load_error_rms_y_m",
-                                      "stage_0_load_error_rms_z_m",
-                                      "stage_1_load_error_rms_x_m",
-                                      "stage_1_load_error_rms_y_m",
-                                      "stage_1_load_error_rms_z_m",
-                                      "stage_2_load_error_rms_x_m",
-                                      "stage_2_load_error_rms_y_m",
-                                      "stage_2_load_error_rms_z_m",
-                                      "stage_3_load_error_rms_x_m",
-                                      "stage_3_load_error_rms_y_m",
-                                      "stage_3_load_error_rms_z_m",
-                                      "stage_4_load_error_rms_x_m",
-                                      "stage_4_load_error_rms_y_m",
-                                      "stage_4_load_error_rms_z_m",
-                                      "stage_5_load_error_rms_x_m",
-                                      "stage_5_load_error_rms_y_m",
-                                      "stage_5_load_error_rms_z_m"}));
+  std::vector<std::string> expected = {"time_of_loss_s", "load_error_rms_m"};
+  for (const char* part :
+       {"", "stage_0_", "stage_1_", "stage_2_", "stage_3_", "stage_4_", "stage_5_"})
+    for (const char* axis : {"x", "y", "z"})
+      expected.push_back(std::string(part) + "load_error_rms_" + axis + "_m");
+  EXPECT_EQ(MeasureList(base, {"time_of_loss", "outcome", "load_error_rms"}).columns(), expected);
   const auto settling = MeasureList(base, {"settling"}).columns();
   EXPECT_EQ(settling.size(), 15u);
   EXPECT_EQ(settling.front(), "stage_0_settling_x_s");
@@ -278,17 +234,6 @@ TEST(FlightMeasuresTest, AnUnknownMeasureIsRefusedWithTheListOfThose) {
 }
 
 // --- outcome -------------------------------------------------------------------------------------
-
-TEST(OutcomeTest, TheLoadIsLostByTheRodOfTheVehicleNotOfItsTemplate) {
-  config::Scenario scenario = load("short");
-  scenario.vehicles[0].rod_length = 0.5;
-  scenario.plant.initial.position.x() += 0.7;
-  const MeasuredFlight flown =
-      fly_measured(scenario, MeasureList(scenario, {}), FlightErrors(1), false);
-  EXPECT_EQ(flown.outcome, Outcome::kLost);
-  EXPECT_EQ(flown.reason,
-            "load more than 0.5 m further from its reference than in the base flight, at 0 s");
-}
 
 /// Flies each delay of a delay margin of vehicle 0 again as a run of a campaign; expects the same
 /// outcome.
@@ -322,30 +267,6 @@ TEST(MeasuredFlightTest, LosesTheLoadByTheRuleOfTheDelayMargin) {
   expect_outcomes_of_delay_margin(load("figure_eight"));
   expect_outcomes_of_delay_margin(load("matlab_setpoint_3"));
   expect_outcomes_of_delay_margin(load_short_team());
-}
-
-TEST(MeasuredFlightTest, SaysWhyAndWhenAFlightFails) {
-  const config::Scenario base = load("short");
-  config::Scenario late = base;
-  config::LeaveUntil never;
-  never.radius_m = 1e-9;
-  never.timeout_ns = 400'000'000;
-  late.mission[0].leave = never;
-  const MeasuredFlight flown = fly_all(late, base);
-  EXPECT_EQ(flown.outcome, Outcome::kFailed);
-  EXPECT_EQ(flown.reason,
-            "controller 'control_client' answered step 100 with a fault: stage_timeout, at 0.4 s");
-  EXPECT_EQ(flown.steps, 101u);
-  EXPECT_EQ(name_values(base, flown).at("time_of_loss_s"), 0.4);
-
-  config::Scenario torn = base;
-  config::BiasFault force;
-  force.offset.force << 1e308, 0.0, 0.0;
-  torn.faults = {make_fault(config::FaultChannel::kCommand, force)};
-  const MeasuredFlight not_finite = fly_all(torn, base);
-  EXPECT_EQ(not_finite.outcome, Outcome::kFailed);
-  EXPECT_NE(not_finite.reason.find("is not finite"), std::string::npos) << not_finite.reason;
-  EXPECT_EQ(not_finite.steps, 1u);
 }
 
 TEST(MeasuredFlightTest, MeasuresDoNotDependOnTheCertificate) {

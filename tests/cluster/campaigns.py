@@ -1,16 +1,16 @@
 """A short campaign whose runs a test can hold, and `./sls campaign` on a test host."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 from hosts import TestHosts
+from places import ROOT
 from processes import wait_until
 
-ROOT = Path(__file__).resolve().parents[2]
-BUILD = Path(os.environ.get("SLS_BUILD", ROOT / "build"))
-PATH = os.pathsep.join([str(ROOT / "python"), str(BUILD / "python")])
+PATH = os.environ["PYTHONPATH"]
 LIMIT_S = 60.0
 
 CAMPAIGN = """\
@@ -44,22 +44,6 @@ def gate(flight):
     return 0.0
 """
 
-BASE = """\
-name: short
-vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
-plant:
-  model: analytic
-  step_s: 0.001
-  initial: { load_position_m: [0, 0, -0.5] }
-sync: { mode: lockstep, period_s: 0.004, wait_for: { controllers: 1, recorders: 1, timeout_s: 30 } }
-controller:
-  gains: { lqr: { horizontal: 10, vertical: 5 } }
-  force_limit_n: 200
-mission:
-  - figure_eight: { amplitude_m: [1.5, 0.75, 0.5], offset_m: [0, 0, -0.5], period_s: 16 }
-    for_s: 2
-"""
-
 # As `./sls campaign`, with changes of constants of the engines, such as shorter time limits.
 LAUNCH = """\
 import importlib, sys
@@ -83,7 +67,7 @@ class TestCampaign:
         self.file = folder / "short.yaml"
         self.file.write_text(CAMPAIGN)
         (folder / "gate.py").write_text(GATE)
-        (folder / "base.yaml").write_text(BASE)
+        shutil.copy(ROOT / "config/scenarios/short.yaml", folder / "base.yaml")
         self.hold_file = folder / "hold"
 
     def start(self, *arguments: str, changes: str = "", **environment: str) -> "Launched":
@@ -91,7 +75,7 @@ class TestCampaign:
         return Launched(subprocess.Popen(
             self.hosts.on("head", *command), stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             text=True, cwd=self.folder,
-            env={**os.environ, "SLS_BUILD": str(BUILD), "PYTHONPATH": PATH, **environment}))
+            env={**os.environ, **environment}))
 
     def fly(self, out: str, *arguments: str, changes: str = "", **environment: str) -> "Launched":
         return self.start(self.file.name, "--out", out, "--chunk-runs", "10", *arguments,
@@ -144,8 +128,3 @@ class Launched:
             assert "Traceback" not in self.output, self.output
             assert self.output.splitlines()[-1].startswith("sls: error: "), self.output
         return self.output
-
-    def close(self) -> None:
-        if self.is_running():
-            self.process.kill()
-            self.process.communicate()

@@ -10,12 +10,13 @@ from processes import Processes, wait_until
 
 START_S = 30.0
 WORKERS = ("n1", "n2")
+PORT = 8786
 
 
 class DaskCluster:
-    """`with DaskCluster(hosts, folder) as dask`: every process is ended at its end. Raises Obstacle."""
+    """Raises Obstacle."""
 
-    def __init__(self, hosts: TestHosts, folder: Path, port: int = 8786):
+    def __init__(self, hosts: TestHosts, folder: Path):
         try:
             import distributed
         except ImportError:
@@ -23,28 +24,22 @@ class DaskCluster:
         assert distributed
         self.hosts = hosts
         self.folder = folder
-        self.port = port
-        self.address = f"tcp://{hosts.address['head']}:{port}"
+        self.address = f"tcp://{hosts.address['head']}:{PORT}"
         self.processes = Processes(folder)
 
-    def __enter__(self) -> "DaskCluster":
-        try:
-            self.start_scheduler()
-            for worker in WORKERS:
-                self.start_worker(worker)
-            for worker in WORKERS:
-                self.wait_for(worker, r"Registered to:")
-        except BaseException:
-            self.processes.end_all()
-            raise
-        return self
+    def start_all(self) -> None:
+        self.start_scheduler()
+        for worker in WORKERS:
+            self.start_worker(worker)
+        for worker in WORKERS:
+            self.wait_for(worker, r"Registered to:")
 
-    def __exit__(self, *_: object) -> None:
-        self.processes.end_all()
+    def end_jobs(self) -> None:
+        """They end with their campaign."""
 
     def start_scheduler(self) -> None:
         self.start("scheduler", "head", "dask_scheduler", "--host", self.hosts.address["head"],
-                   "--port", str(self.port))
+                   "--port", str(PORT))
         self.wait_for("scheduler", r"Scheduler at:")
 
     def start_worker(self, name: str) -> None:

@@ -1,92 +1,60 @@
 """Campaigns on a real Dask cluster give the table of the local engine, also if processes are killed."""
 
-from collections.abc import Iterator
-from pathlib import Path
-
-import pytest
-from campaigns import PATH, TestCampaign
+from campaigns import PATH
 from dask_cluster import DaskCluster
-from hosts import Obstacle, TestHosts
 
+CLUSTER = DaskCluster
 FAST = "dask.CONNECT_S=1"
 
 
-@pytest.fixture(scope="module")
-def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[DaskCluster]:
-    try:
-        with TestHosts("head", "n1", "n2") as hosts, \
-                DaskCluster(hosts, tmp_path_factory.mktemp("dask")) as cluster:
-            yield cluster
-    except Obstacle as obstacle:
-        pytest.skip(str(obstacle))
-
-
-@pytest.fixture(scope="module")
-def flown(dask: DaskCluster, tmp_path_factory: pytest.TempPathFactory) -> TestCampaign:
-    """The campaign, flown by the local engine in the folder `local`."""
-    campaign = TestCampaign(dask.hosts, tmp_path_factory.mktemp("campaign"))
-    campaign.fly("local").expect(0)
-    return campaign
-
-
-@pytest.fixture
-def campaign(flown: TestCampaign) -> Iterator[TestCampaign]:
-    yield flown
-    flown.release()
-
-
-def test_dask_makes_the_table_of_the_local_engine(dask: DaskCluster,
-                                                  campaign: TestCampaign) -> None:
-    campaign.fly("plain", "--on", "dask", "--scheduler", dask.address).expect(0)
+def test_dask_makes_the_table_of_the_local_engine(cluster, campaign):
+    campaign.fly("plain", "--on", "dask", "--scheduler", cluster.address).expect(0)
     assert campaign.table("plain") == campaign.table("local")
     assert campaign.machines("plain") == {"n1", "n2"}
 
 
-def test_the_chunk_of_a_killed_worker_goes_to_another_one(dask: DaskCluster,
-                                                          campaign: TestCampaign) -> None:
+def test_the_chunk_of_a_killed_worker_goes_to_another_one(cluster, campaign):
     campaign.hold()
-    launched = campaign.fly("killed", "--on", "dask", "--scheduler", dask.address)
+    launched = campaign.fly("killed", "--on", "dask", "--scheduler", cluster.address)
     campaign.wait_until_held("n1", "n2")
-    dask.processes.kill("n1")
+    cluster.processes.kill("n1")
     campaign.release()
     launched.expect(0)
     assert campaign.table("killed") == campaign.table("local")
     assert campaign.machines("killed") == {"n2"}
-    dask.start_worker("n1")
+    cluster.start_worker("n1")
 
 
-def test_a_campaign_waits_for_workers(dask: DaskCluster, campaign: TestCampaign) -> None:
+def test_a_campaign_waits_for_workers(cluster, campaign):
     campaign.hold()
-    launched = campaign.fly("waited", "--on", "dask", "--scheduler", dask.address)
+    launched = campaign.fly("waited", "--on", "dask", "--scheduler", cluster.address)
     campaign.wait_until_held("n1", "n2")
     for worker in ("n1", "n2"):
-        dask.processes.kill(worker)
+        cluster.processes.kill(worker)
     campaign.release()
     for worker in ("n1", "n2"):
-        dask.start_worker(worker)
+        cluster.start_worker(worker)
     launched.expect(0)
     assert campaign.table("waited") == campaign.table("local")
 
 
-def test_a_lost_scheduler_ends_the_campaign_with_a_line_and_resume_goes_on(
-        dask: DaskCluster, campaign: TestCampaign) -> None:
+def test_a_lost_scheduler_ends_the_campaign_with_a_line_and_resume_goes_on(cluster, campaign):
     campaign.hold()
-    launched = campaign.fly("lost", "--on", "dask", "--scheduler", dask.address, changes=FAST)
+    launched = campaign.fly("lost", "--on", "dask", "--scheduler", cluster.address, changes=FAST)
     campaign.wait_until_held("n1", "n2")
-    dask.processes.kill("scheduler")
+    cluster.processes.kill("scheduler")
     launched.expect(1, "is lost; 0 of 6 chunks are in", "--resume")
     for worker in ("n1", "n2"):  # without a scheduler they would end later
-        dask.processes.kill(worker)
+        cluster.processes.kill(worker)
     campaign.release()
-    dask.start_scheduler()
+    cluster.start_scheduler()
     for worker in ("n1", "n2"):
-        dask.start_worker(worker)
-    campaign.fly("lost", "--on", "dask", "--scheduler", dask.address, "--resume").expect(0)
+        cluster.start_worker(worker)
+    campaign.fly("lost", "--on", "dask", "--scheduler", cluster.address, "--resume").expect(0)
     assert campaign.table("lost") == campaign.table("local")
 
 
-def test_without_dask_the_message_says_what_to_install_or_start(campaign: TestCampaign,
-                                                                tmp_path: Path) -> None:
+def test_without_dask_the_message_says_what_to_install_or_start(campaign, tmp_path):
     campaign.fly("none", "--on", "dask").expect(2, "--scheduler: expected", "dask-worker")
     address = f"tcp://{campaign.hosts.address['head']}:9"
     campaign.fly("closed", "--on", "dask", "--scheduler", address, changes=FAST).expect(

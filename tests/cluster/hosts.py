@@ -3,14 +3,10 @@
 import os
 import shutil
 import subprocess
-import sys
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[2]
-sys.path += [str(ROOT / "python"), str(ROOT / "tests/support")]
-from processes import kill  # noqa: E402
-from sls.check.hosts import Network  # noqa: E402
-from sls.errors import RunError as Obstacle  # noqa: E402  why this machine cannot run these hosts or the cluster
+from processes import kill
+from sls.check.hosts import Network
+from sls.errors import RunError as Obstacle  # why this machine cannot run these hosts or the cluster
 
 
 def need_programs(package: str, *programs: str) -> None:

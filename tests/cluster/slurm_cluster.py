@@ -9,7 +9,7 @@ from pathlib import Path
 from processes import Processes, wait_until
 from hosts import TestHosts, need_programs
 
-START_S = 30.0
+START_S, LIMIT_S = 30.0, 60.0
 NODES = ("n1", "n2")
 
 # With process groups instead of cgroups, and without accounting, the cluster needs neither systemd nor a
@@ -47,7 +47,7 @@ PartitionName=all Nodes=ALL Default=YES MaxTime=INFINITE State=UP
 
 
 class SlurmCluster:
-    """`with SlurmCluster(hosts, folder) as slurm`: every process is ended at its end. Raises Obstacle."""
+    """Raises Obstacle."""
 
     def __init__(self, hosts: TestHosts, folder: Path):
         need_programs("slurm-wlm munge", "munged", "slurmctld", "slurmd", "sbatch", "squeue",
@@ -57,7 +57,7 @@ class SlurmCluster:
         self.configuration = folder / "slurm.conf"
         self.processes = Processes(folder)
 
-    def __enter__(self) -> "SlurmCluster":
+    def start_all(self) -> None:
         folder = self.folder
         folder.chmod(0o755)  # munged requires it
         (folder / "state").mkdir(exist_ok=True)
@@ -70,23 +70,18 @@ class SlurmCluster:
                           for node in NODES)
         self.configuration.write_text(CONFIGURATION.format(
             head=self.hosts.address["head"], folder=folder, nodes=nodes))
-        try:
-            self.start("munged", "head", "munged", "--foreground", "--force", "--key-file", str(key),
-                       "--socket", f"{folder}/munge.socket", "--pid-file", f"{folder}/munged.pid",
-                       "--seed-file", f"{folder}/munge.seed", "--log-file", f"{folder}/munged.log")
-            wait_until((folder / "munge.socket").exists, START_S, "munged listens")
-            self.start_controller()
-            for node in NODES:
-                self.start_node(node)
-            wait_until(lambda: self.list_states() == {node: "idle" for node in NODES}, START_S,
-                       "both nodes are idle")
-        except BaseException:
-            self.processes.end_all()
-            raise
-        return self
+        self.start("munged", "head", "munged", "--foreground", "--force", "--key-file", str(key),
+                   "--socket", f"{folder}/munge.socket", "--pid-file", f"{folder}/munged.pid",
+                   "--seed-file", f"{folder}/munge.seed", "--log-file", f"{folder}/munged.log")
+        wait_until((folder / "munge.socket").exists, START_S, "munged listens")
+        self.start_controller()
+        for node in NODES:
+            self.start_node(node)
+        wait_until(lambda: self.list_states() == {node: "idle" for node in NODES}, START_S, "both nodes are idle")
 
-    def __exit__(self, *_: object) -> None:
-        self.processes.end_all()  # tasks that still run are killed when their hosts are removed
+    def end_jobs(self) -> None:
+        self.ask("scancel", "--user=root")
+        wait_until(lambda: not self.ask("squeue", "--noheader"), LIMIT_S, "no job is left")
 
     def start(self, name: str, host: str, *command: str) -> None:
         self.processes.start(name, self.hosts.on(host, *command), **self.environment)

@@ -3,14 +3,11 @@ every folder that CMake builds without tests."""
 
 import pathlib
 import re
-import sys
 import unittest
 
 import yaml
-
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "python"))
-from sls.launcher.docker_demo import BASES  # noqa: E402
+from places import ROOT
+from sls.launcher.docker_demo import BASES
 
 
 def list_allowed():
@@ -62,7 +59,3 @@ class ContextTest(unittest.TestCase):
             self.assertIn(f"FROM ${system.upper()} AS {system}\n", dockerfile)
             self.assertEqual(build["args"][system.upper()], f"${{SLS_BASE:-{base}}}")
             self.assertEqual(BASES[system], base)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -4,12 +4,12 @@ the heading exists, too."""
 import os
 import re
 import subprocess
-import sys
 import unittest
 from pathlib import Path
 from urllib.parse import unquote
 
-ROOT = Path(__file__).resolve().parents[2]
+from places import ROOT
+
 SKIPPED = ("build", "recordings", "campaigns-", "node_modules", ".")  # prefixes of folders outside the project
 
 FENCED = re.compile(r"^( *)(```|~~~).*?^ *\2[^\n]*$", re.MULTILINE | re.DOTALL)
@@ -112,7 +112,3 @@ class LinksTest(unittest.TestCase):
         for text in ("`[x](no.md)`", "```\n[x](no.md)\n```", "[x](https://example.org/no)", "a\n\n    [x](no.md)\n",
                      "# A `b` (c), d\n[x](#a-b-c-d)", "## A\n## A\n[x](#a-1)", "[x](/docs)"):
             self.assertEqual(list(find_defects(document, text)), [], text)
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

@@ -1,18 +1,14 @@
 """docs/reference equals the help texts of the built programs; the man pages are well formed.
-
-Its argument is the build tree.
 """
 
 import pathlib
+import re
 import subprocess
-import sys
 import tempfile
 import unittest
 
 import yaml
-
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build"
+from places import BUILD, ROOT
 
 
 def run_reference(*arguments):
@@ -34,6 +30,8 @@ class Reference(unittest.TestCase):
 
     def test_names_every_key_of_the_shipped_scenarios(self):
         page = (ROOT / "docs/reference/scenario.md").read_text(encoding="utf-8")
+        cells = re.findall(r"^\| (`.*?) \|", page, re.MULTILINE)
+        named = {path for cell in cells for path in re.findall("`(.*?)`", cell)}
 
         def list_paths(node, path=""):
             if isinstance(node, dict):
@@ -47,7 +45,7 @@ class Reference(unittest.TestCase):
 
         for file in sorted((ROOT / "config/scenarios").glob("*.yaml")):
             for path in list_paths(yaml.load(file.read_text(encoding="utf-8"), yaml.BaseLoader)):
-                self.assertTrue(f"| `{path}` |" in page, f"{file.name}: {path}")
+                self.assertIn(path, named, file.name)
 
 
 class ManPages(unittest.TestCase):
@@ -61,13 +59,3 @@ class ManPages(unittest.TestCase):
             self.assertIn("sim_server.1", names)
             for page in pages:
                 self.assertEqual(lint(page), "", page.name)
-
-    def test_lint_finds_a_mistake(self):
-        with tempfile.NamedTemporaryFile("w", suffix=".1") as page:
-            page.write('.TH X 1 2026-01-01\n.SH NAME\nx \\- y\n.XX\n')
-            page.flush()
-            self.assertNotEqual(lint(page.name), "")
-
-
-if __name__ == "__main__":
-    unittest.main()

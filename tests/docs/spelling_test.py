@@ -1,11 +1,9 @@
 """codespell finds no misspelt word in the files of the repository."""
 
-import pathlib
 import subprocess
-import sys
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
+from places import ROOT
 
 
 class SpellingTest(unittest.TestCase):
@@ -22,7 +20,3 @@ class SpellingTest(unittest.TestCase):
         command = ["codespell", "--config", ROOT / "tests/docs/codespell.cfg", "--quiet-level", "35", *paths]
         spelling = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
         self.assertEqual(spelling.stdout + spelling.stderr, "")
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

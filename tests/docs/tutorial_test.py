@@ -13,7 +13,7 @@ Comments in the document, which are not visible in a browser, mark its blocks:
     <!-- any order -->                     its lines come in any order, because several programs print them
     <!-- waits -->                         the next block waits for the end of its commands, as in terminal 1
     <!-- when 2 shows: TEXT -->            runs only after terminal 2 has printed TEXT
-    <!-- checked: page -->                 then the page's address must answer; `foxglove`: as a Foxglove server
+    <!-- checked: page, foxglove -->       then the address must answer with the page, and as a Foxglove server
 
 Lines that begin with `$ ` are commands, `^C` interrupts; the other lines are their output. The output of a command
 without output lines is not compared. `…` matches left-out lines, or any text in a line. Numbers in VARYING differ from
@@ -411,7 +411,8 @@ class Reader:
         if "checked" in marks:
             terminal.wait_for(f"page: http://127.0.0.1:{self.port}/", terminal.begin)
             try:
-                CHECKS[marks["checked"]](self.port)
+                for name in marks["checked"].split(", "):
+                    CHECKS[name](self.port)
             except OSError as error:
                 raise Failure(f"{block.line}: {error}") from error
 

@@ -40,11 +40,8 @@ class ForeignTest : public ProgramsTest {
   }
   /// Starts the client with `flags`; returns when its mistake becomes visible.
   std::unique_ptr<Process> start_foreign(const Words& flags) const {
-    return start_and_wait(Words{SLS_FOREIGN_CLIENTS "/foreign_client", "--domain", domain.text()} +
-                          flags);
-  }
-  static std::unique_ptr<Process> start_and_wait(const Words& command) {
-    auto client = std::make_unique<Process>(command);
+    auto client = std::make_unique<Process>(
+        Words{SLS_FOREIGN_CLIENTS "/foreign_client", "--domain", domain.text()} + flags);
     EXPECT_TRUE(wait_for_text(*client, "begins\n")) << client->output();
     return client;
   }
@@ -202,18 +199,20 @@ TEST_F(ForeignTest, AppendableTypesOfCyclone) {
   if (!SLS_HAS_CYCLONE)
     GTEST_SKIP() << "built without Cyclone DDS: apt-get install cyclonedds-dev cyclonedds-tools";
   start();
-  const auto client = start_and_wait(
+  Process client(
       {"env",
        "CYCLONEDDS_URI=<CycloneDDS><Domain><General><Interfaces><NetworkInterface name=\"lo\" "
        "multicast=\"true\"/></Interfaces></General></Domain></CycloneDDS>",
        SLS_FOREIGN_CLIENTS "/appendable_client", domain.text()});
   const std::string written =
-      " of 'appendable' (127.0.0.1): DATA_REPRESENTATION: offered XCDR2, "
+      " of 'my_client' (127.0.0.1): DATA_REPRESENTATION: offered XCDR2, "
       "asked XCDR1 (compile the types as @final)";
+  const std::string read =
+      " for 'my_client' (127.0.0.1): DATA_REPRESENTATION: offered XCDR1, "
+      "asked XCDR2 (compile the types as @final)";
   // The line names the endpoint that is discovered first.
-  expect_server_line({"sls/participant" + written, "sls/command" + written,
-                      "sls/state for 'appendable' (127.0.0.1): DATA_REPRESENTATION: offered XCDR1, "
-                      "asked XCDR2 (compile the types as @final)"});
+  expect_server_line({"sls/participant" + written, "sls/command" + written, "sls/state" + read,
+                      "sls/parameters" + read, "sls/status" + read});
   EXPECT_EQ(count_mistakes(server->output()), 1);
   expect_line("recorder", *recorder, {"sls/participant" + written});
 }

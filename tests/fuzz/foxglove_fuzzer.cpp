@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
+#include <memory>
 
 #include "tests/tools/view/foxglove/fakes.hpp"
 
@@ -50,11 +51,11 @@ struct Bench {
   };
 
   int runs = 0;
-  foxglove::test::FakeFlight* flight = new foxglove::test::FakeFlight;  // owned by the hub
+  const std::unique_ptr<foxglove::test::FakeFlight> flight =
+      std::make_unique<foxglove::test::FakeFlight>();
   std::chrono::steady_clock::time_point now{std::chrono::hours(1)};
-  std::shared_ptr<foxglove::Hub> hub =
-      std::make_shared<foxglove::Hub>(std::unique_ptr<foxglove::FlightSource>(flight),
-                                      [this] { return now += std::chrono::milliseconds(7); });
+  std::shared_ptr<foxglove::Hub> hub = std::make_shared<foxglove::Hub>(
+      *flight, *flight, [this] { return now += std::chrono::milliseconds(7); });
   CheckedConnection connection = make_connection();
   foxglove::FoxgloveSession session{hub, connection.connection};
 

@@ -3,18 +3,15 @@
 The launcher runs in a small checkout, whose programs print a text of their sources. Stand-ins before the real cmake
 and ninja record how these are called."""
 
-import pathlib
 import re
 import shutil
 import subprocess
-import sys
 import unittest
 
-from checkout import ROOT, CheckoutTest
+from checkout import CheckoutTest
+from places import BUILD, ROOT
+from sls.launcher.building import FLYING
 
-BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
-sys.path.insert(0, str(ROOT / "python"))
-from sls.launcher.building import FLYING  # noqa: E402
 CMAKE = """cmake_minimum_required(VERSION 3.25)
 set(CMAKE_C_COMPILER_WORKS TRUE)  # these two save two builds in each new tree
 set(CMAKE_C_ABI_COMPILED TRUE)
@@ -130,26 +127,17 @@ class BuildTest(CheckoutTest):
         self.git("switch", "-q", "one")
         self.expect_built("first")
 
-    def test_another_preset_is_applied(self):
-        self.expect_built("first")
-        presets = (self.root / "CMakePresets.json").read_text()
-        self.assertIn('"CMAKE_BUILD_TYPE": "Release"', presets)
-        self.write("CMakePresets.json", presets.replace('"CMAKE_BUILD_TYPE": "Release"',
-                                                        r'"CMAKE_C_FLAGS": "-DTEXT=\\\"flag\\\""'))
-        self.write("text.h", "")
-        self.expect_built("flag")
-        self.expect_not_built("flag")
-
-    def test_a_preset_with_another_compiler_keeps_its_values(self):
+    def test_another_preset_is_applied_also_one_with_another_compiler(self):
         self.expect_built("first")
         (self.folder / "bin/other_cc").symlink_to(shutil.which("cc"))
         presets = (self.root / "CMakePresets.json").read_text()
-        self.write("CMakePresets.json", presets.replace(
-            '"CMAKE_BUILD_TYPE": "Release"',
-            r'"CMAKE_C_COMPILER": "other_cc", "CMAKE_C_FLAGS": "-DTEXT=\\\"other\\\""'))
+        self.assertIn('"CMAKE_BUILD_TYPE": "Release"', presets)
         self.write("text.h", "")
-        self.expect_built("other")
-        self.expect_not_built("other")
+        for text, compiler in (("flag", ""), ("other", '"CMAKE_C_COMPILER": "other_cc", ')):
+            self.write("CMakePresets.json", presets.replace(
+                '"CMAKE_BUILD_TYPE": "Release"', rf'{compiler}"CMAKE_C_FLAGS": "-DTEXT=\\\"{text}\\\""'))
+            self.expect_built(text)
+            self.expect_not_built(text)
 
     def test_a_first_flight_builds_what_it_needs_and_a_whole_tree_stays_whole(self):
         self.assertIn("cmake --preset flight --fresh", self.expect_flight("first"))
@@ -161,7 +149,10 @@ class BuildTest(CheckoutTest):
         self.expect_not_built("header")
 
     def test_a_long_build_says_how_far_it_is_by_the_lines_of_its_files_once_a_tenth_is_done(self):
-        self.write("compiler", '#!/bin/sh\ncase "$*" in *closed_loop*) sleep 18 ;; esac\nexec "$@"\n')
+        launcher = (self.root / "sls").read_text()
+        self.assertIn(" next=15\n", launcher)
+        (self.root / "sls").write_text(launcher.replace(" next=15\n", " next=6\n"))  # the first time after 6 s
+        self.write("compiler", '#!/bin/sh\ncase "$*" in *closed_loop*) sleep 8 ;; esac\nexec "$@"\n')
         (self.root / "compiler").chmod(0o755)
         self.write("CMakeLists.txt", CMAKE + """add_executable(long long.c)
 set_target_properties(${programs} long PROPERTIES C_COMPILER_LAUNCHER ${CMAKE_SOURCE_DIR}/compiler)
@@ -215,7 +206,3 @@ class RealTreeTest(unittest.TestCase):
     def test_cmake_runs_again_when_a_preset_changes(self):
         rule = re.search(r"^build build\.ninja.*?: RERUN_CMAKE.*$", (BUILD / "build.ninja").read_text(), re.MULTILINE)
         self.assertTrue(f" {ROOT}/CMakePresets.json " in rule.group(0), "no rule depends on CMakePresets.json")
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

@@ -1,13 +1,10 @@
 """Small checkouts for tests: parts of this one, and stand-ins for programs of the machine."""
 
 import os
-import pathlib
 import shutil
-import sys
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tests/support"))
-from folder_test import FolderTest  # noqa: E402
+from folder_test import FolderTest
+from places import ROOT
 
 
 def copy(name, root):

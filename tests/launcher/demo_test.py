@@ -3,14 +3,11 @@ there. A verdict that cannot be given never changes the exit code of the flight.
 
 import itertools
 import os
-import pathlib
 import subprocess
-import sys
-import tempfile
-import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
+from folder_test import FolderTest
+from places import BUILD, ROOT
+
 CORE = next((BUILD / "python").glob("_sls_core.*.so"))
 MISSING = "raise ModuleNotFoundError(f\"No module named '{__name__}'\", name=__name__)\n"
 NOT_BUILT = "expected the module _sls_core: run ./sls python or ./sls build"
@@ -34,11 +31,9 @@ for absent in itertools.chain.from_iterable(itertools.combinations(("numpy", "ya
                                              f"No module named '{needed[0]}'" if needed else None)
 
 
-class DemoTest(unittest.TestCase):
+class DemoTest(FolderTest):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = pathlib.Path(folder.name)
+        super().setUp()
         (self.folder / "build/bin").mkdir(parents=True)
         for program in ("sim_server", "control_client", "recorder", "closed_loop"):
             (self.folder / "build/bin" / program).symlink_to(BUILD / "bin" / program)
@@ -85,7 +80,3 @@ class DemoTest(unittest.TestCase):
         done = self.fly({CORE.name: None, "yaml.py": judge})
         self.assertEqual(done.returncode, 1, done.stderr)
         self.assertIn("1 not held", done.stdout)
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

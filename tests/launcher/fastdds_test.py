@@ -5,10 +5,9 @@ Packages made of a few files stand in for versions 2.9 and 3.1; nothing of this 
 import os
 import shutil
 import subprocess
-import sys
-import unittest
 
-from checkout import ROOT, FolderTest
+from folder_test import FolderTest
+from places import ROOT
 
 PROJECT = """cmake_minimum_required(VERSION 3.25)
 project(small LANGUAGES CXX)
@@ -151,7 +150,3 @@ class FastDdsTest(FolderTest):
         self.write("fastddsgen", "#!/bin/sh\nexit 1\n", 0o755)
         (self.folder / "two/include/fastrtps/config.h").unlink()
         self.expect_taken("major 2, target fastrtps")
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

@@ -12,24 +12,21 @@ import re
 import signal
 import socket
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
 
 import checkout
-
-ROOT = checkout.ROOT
-BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
-sys.path[:0] = [str(ROOT / "python"), str(ROOT / "tests/support")]
-from own_domain import OwnDomain  # noqa: E402
-from sls import __version__  # noqa: E402
-from sls.launcher import completion, flights, listing  # noqa: E402
-from sls.launcher.commands import FOREIGN, check_words  # noqa: E402
-from sls.launcher.place import Failure, list_names  # noqa: E402
+from own_domain import OwnDomain
+from places import ROOT, launch
+from sls import __version__
+from sls.launcher import completion, flights, listing
+from sls.launcher.commands import FOREIGN, check_words
+from sls.launcher.place import Failure, list_names
 
 MISTAKES = {
     "rrun short": "unknown command 'rrun'; did you mean 'run'? (see ./sls help)",
+    "frobnicate": "unknown command 'frobnicate' (see ./sls help)",
     "run": "expected a scenario (see ./sls run --help)",
     "run short hover": "expected one scenario, got 'short' and 'hover'",
     "run figure_eigth": "ROOT/config/scenarios/figure_eigth.yaml: expected a scenario, got no such file; did you mean "
@@ -128,18 +125,13 @@ class MistakesTest(checkout.CheckoutTest):
 class AnswersTest(unittest.TestCase):
     """What the launcher says itself, with the programs of the build."""
 
-    def launch(self, *words, **more):
-        done = subprocess.run([ROOT / "sls", *words], env={**os.environ, "SLS_BUILD": str(BUILD)}, capture_output=True,
-                              text=True, timeout=60, check=True, **more)
-        return done.stdout
-
     def test_the_version_is_that_of_cmake(self):
         version = re.search(r"^project\(sls VERSION (\S+)", (ROOT / "CMakeLists.txt").read_text(), re.MULTILINE)[1]
-        self.assertEqual(self.launch("--version"), f"sls {version}\n")
+        self.assertEqual(launch("--version").stdout, f"sls {version}\n")
         self.assertEqual(__version__, version)
 
     def test_the_list_has_every_name_and_fits_the_terminal(self):
-        said = self.launch("list")
+        said = launch("list").stdout
         names = set(re.findall(r"^  (\S+) {2,}\S", said, re.MULTILINE))
         for file, kind in (("control_client/laws/laws.def", "LAW"), ("sim_server/plants/plants.def", "PLANT")):
             own = set(re.findall(rf"^SLS_{kind}\((\w+)\)", (ROOT / file).read_text(), re.MULTILINE))
@@ -151,7 +143,7 @@ class AnswersTest(unittest.TestCase):
 
     def test_the_summary_for_machines_is_one_line_of_json(self):
         with tempfile.TemporaryDirectory() as folder:
-            said = self.launch("run", "short", "--in-process", "--json", "--out", "r", cwd=folder)
+            said = launch("run", "short", "--in-process", "--json", "--out", "r", cwd=folder).stdout
             summary = json.loads(said)
             manifest = json.loads(pathlib.Path(folder, "r/manifest.json").read_text())
         self.assertEqual(said.count("\n"), 1)
@@ -163,7 +155,7 @@ class AnswersTest(unittest.TestCase):
             ours, theirs = pty.openpty()
             process = subprocess.Popen(
                 [ROOT / "sls", "run", "short", "--mode", "realtime", "--rtf", "0.3", "--domain", str(domain),
-                 "--out", f"{folder}/r"], env={**os.environ, "SLS_BUILD": str(BUILD)}, stderr=theirs)
+                 "--out", f"{folder}/r"], stderr=theirs)
             os.close(theirs)
             said = b""
             try:
@@ -183,10 +175,9 @@ class AnswersTest(unittest.TestCase):
 
     def test_ctrl_c_in_a_report_is_one_line(self):
         with tempfile.TemporaryDirectory() as folder:
-            self.launch("run", "short", "--in-process", "--out", "r", cwd=folder)
+            launch("run", "short", "--in-process", "--out", "r", cwd=folder)
             for command in ("report", "plot"):
-                process = subprocess.Popen([ROOT / "sls", command, "r"], env={**os.environ, "SLS_BUILD": str(BUILD)},
-                                           cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+                process = subprocess.Popen([ROOT / "sls", command, "r"], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
                 maps = pathlib.Path(f"/proc/{process.pid}/maps")
                 deadline = time.monotonic() + 60
                 while "numpy" not in maps.read_text():  # it imports what it needs
@@ -194,7 +185,3 @@ class AnswersTest(unittest.TestCase):
                     time.sleep(0.001)
                 process.send_signal(signal.SIGINT)
                 self.assertEqual((*process.communicate(timeout=60), process.returncode), ("", "sls: interrupted\n", 130))
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

@@ -18,8 +18,8 @@ import subprocess
 import sys
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = pathlib.Path(sys.argv[1]).resolve() if len(sys.argv) > 1 else ROOT / "build"
+from places import BUILD, ROOT
+
 LAUNCHER = (ROOT / "sls").read_text(encoding="utf-8")
 SYSTEM = "".join(re.findall(r'^(?:ID|VERSION_ID)="?(\w+)"?$', "\n".join(sorted(
     pathlib.Path("/etc/os-release").read_text(encoding="utf-8").splitlines())), re.MULTILINE))  # such as debian12
@@ -98,18 +98,9 @@ def calc_closure(packages):
 
 
 @functools.cache
-def closure_of_flight():
-    return calc_closure(LISTS["flight_packages"] + LISTS[f"{SYSTEM}_packages"])
-
-
-@functools.cache
-def closure_of_build():
-    return calc_closure(LISTS["flight_packages"] + LISTS["packages"] + LISTS[f"{SYSTEM}_packages"])
-
-
-@functools.cache
-def closure_of_tests():
-    return calc_closure(list_named())
+def closure_of(what):
+    flight = LISTS["flight_packages"] + LISTS[f"{SYSTEM}_packages"]
+    return calc_closure({"flight": flight, "build": flight + LISTS["packages"], "tests": list_named()}[what])
 
 
 @functools.cache
@@ -216,7 +207,7 @@ class PackagesTest(unittest.TestCase):
         self.assertGreaterEqual(len({name for name, _, _ in needed}), fewest)
         self.assertEqual(sorted(
             f"{source.relative_to(ROOT)}: {name}: in {', '.join(sorted(owners_of(path))) or 'no package'}"
-            for name, path, source in needed if not owners_of(path) & closure_of_tests()), [])
+            for name, path, source in needed if not owners_of(path) & closure_of("tests")), [])
 
     def test_every_package_of_the_launcher_is_installed(self):
         self.assertGreater(len(list_named()), 40)
@@ -224,7 +215,7 @@ class PackagesTest(unittest.TestCase):
 
     def test_a_package_without_a_name_in_the_launcher_is_outside(self):
         # The closure must be smaller than what is installed, and what builds must be smaller than what tests.
-        for less, more in ((closure_of_flight(), closure_of_build()), (closure_of_build(), closure_of_tests())):
+        for less, more in ((closure_of("flight"), closure_of("build")), (closure_of("build"), closure_of("tests"))):
             self.assertLess(less & read_installed().keys(), more & read_installed().keys())
         self.assertNotIn("libgtest-dev", calc_closure(["cmake"]))
         self.assertIn({"debian12": "libstdc++-12-dev", "debian13": "libstdc++-14-dev"}[SYSTEM], calc_closure(["g++"]))
@@ -241,10 +232,10 @@ class PackagesTest(unittest.TestCase):
         self.expect_in_closure(needed, 100)
         self.assertEqual(sorted(f"{source.relative_to(ROOT)}: {name}" for name, header, source in needed
                                 if not is_for_tests(source) and "fuzzer" not in name
-                                and not owners_of(header) & closure_of_build()), [], "needed by ./sls build")
+                                and not owners_of(header) & closure_of("build")), [], "needed by ./sls build")
         self.assertEqual(sorted(f"{source.relative_to(ROOT)}: {name}" for name, header, source in needed
                                 if source.relative_to(ROOT).parts[0] in FLIGHT
-                                and not owners_of(header) & closure_of_flight()), [], "needed by ./sls demo")
+                                and not owners_of(header) & closure_of("flight")), [], "needed by ./sls demo")
 
     def test_files_that_cmake_found_are_of_named_packages(self):
         cache = BUILD / "CMakeCache.txt"
@@ -289,7 +280,3 @@ class PackagesTest(unittest.TestCase):
         self.assertGreaterEqual(names, {"chromium", "codespell", "debootstrap", "git", "ip", "mandoc", "munged", "nft",
                                         "openssl", "slurmctld", "unshare", "/usr/bin/python3"})
         self.expect_in_closure({one for one in needed if not owners_of(one[1]) & others}, 50)
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

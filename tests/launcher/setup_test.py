@@ -3,8 +3,6 @@
 A copy of the launcher reads the test's own os-release. Stand-ins for dpkg-query, apt-get and npm record their calls."""
 
 import subprocess
-import sys
-import unittest
 
 from checkout import CheckoutTest
 
@@ -121,7 +119,3 @@ class SetupTest(CheckoutTest):
             code, said, _ = self.launch(BOOKWORM, "setup", "--no-install")
             self.assertEqual(code, 1)
             self.assertRegex(said.splitlines()[-1], "^sls: error: npm ci: code ENOTFOUND .* failed .whole log: ")
-
-
-if __name__ == "__main__":
-    unittest.main(argv=sys.argv[:1])

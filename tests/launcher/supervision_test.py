@@ -4,16 +4,11 @@ import os
 import pathlib
 import signal
 import subprocess
-import sys
-import time
-import unittest
 
-from checkout import ROOT, FolderTest
+from folder_test import FolderTest
+from processes import wait_until
+from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor
 
-sys.path.insert(0, str(ROOT / "python"))
-from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor  # noqa: E402
-
-del sys.argv[1:]  # the build tree
 # A launcher that starts stand-ins.
 LAUNCHER = """
 import sys
@@ -35,14 +30,11 @@ class SupervisionTest(FolderTest):
                    for name, script in programs.items()}
         launcher = subprocess.Popen(
             ["/usr/bin/python3", "-B", "-c", LAUNCHER.format(programs=scripts, patience=patience, overrun=overrun)],
-            env={**os.environ, "PYTHONPATH": str(ROOT / "python")}, stderr=subprocess.PIPE, text=True,
-            start_new_session=True)
+            stderr=subprocess.PIPE, text=True, start_new_session=True)
         self.addCleanup(self.kill, launcher)
-        deadline = time.monotonic() + LIMIT_S
         for name, script in programs.items():
-            while "READY" in script and not (self.folder / f"{name}.pid").exists():
-                self.assertLess(time.monotonic(), deadline, f"{name} did not start")
-                time.sleep(0.01)
+            if "READY" in script:
+                wait_until((self.folder / f"{name}.pid").exists, LIMIT_S, f"{name} starts")
         return launcher
 
     def kill(self, launcher):
@@ -53,10 +45,8 @@ class SupervisionTest(FolderTest):
         launcher.stderr.close()
 
     def wait_for_state(self, process, state):
-        deadline = time.monotonic() + LIMIT_S
-        while pathlib.Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != state:
-            self.assertLess(time.monotonic(), deadline)
-            time.sleep(0.001)
+        stat = pathlib.Path(f"/proc/{process}/stat")
+        wait_until(lambda: stat.read_text().rpartition(")")[2].split()[0] == state, LIMIT_S, f"state {state}")
 
     def find(self, name):
         return int((self.folder / f"{name}.pid").read_text())
@@ -129,10 +119,7 @@ class SupervisionTest(FolderTest):
         launcher = self.start(one="READY; exec sleep 100")
         launcher.kill()
         launcher.wait(LIMIT_S)
-        deadline = time.monotonic() + LIMIT_S
-        while pathlib.Path("/proc", str(self.find("one"))).exists():
-            self.assertLess(time.monotonic(), deadline)
-            time.sleep(0.01)
+        wait_until(lambda: not pathlib.Path("/proc", str(self.find("one"))).exists(), LIMIT_S, "the program ends")
 
     def test_an_error_of_the_launcher_leaves_no_program(self):
         with self.assertRaises(ValueError), Supervisor() as supervisor:
@@ -150,7 +137,3 @@ class SupervisionTest(FolderTest):
                 supervisor.start("one", ["sleep", "0.1"])
                 self.assertEqual(supervisor.wait_all(), 0)
             self.assertEqual(said, expected)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -29,7 +29,7 @@ TEST_F(ClockTest, InLockstepItDoesNotMatter) {
   shift(options, "control_client", "+3600s");
   shift(options, "recorder", "-3600s");
   Flight flight(scenario("short"), options);
-  expect_same(flight, scenario("short"));
+  test::expect_same(flight, scenario("short"));
 }
 
 // The LIFESPAN of commands compares the clocks of two machines: it would drop every command of a

@@ -12,12 +12,6 @@ class NoMulticastTest : public HostsTest {
     HostsTest::SetUp();
     if (network_) network_->block_multicast();
   }
-
-  void expect_same(const std::string& profile) {
-    const Profile configured(*network_, profile);
-    Flight flight(scenario("short"), configured.flight_options());
-    test::expect_same(flight, scenario("short"));
-  }
 };
 
 TEST_F(NoMulticastTest, InitialPeersFindEachOther) { expect_same("unicast"); }

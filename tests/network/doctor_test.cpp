@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "tests/network/hosts_flight.hpp"
+#include "tests/support/faketime.hpp"
 
 namespace sls::test {
 namespace {
@@ -187,15 +188,8 @@ TEST_F(DoctorTest, NamesADiscoveryServerThatIsNotThere) {
 }
 
 TEST_F(DoctorTest, NamesAClockThatIsAnHourOff) {
-  std::string library;
-  for (const auto& folder : std::filesystem::directory_iterator("/usr/lib")) {
-    std::error_code none;
-    const auto candidate = folder.path() / "faketime/libfaketimeMT.so.1";
-    if (std::filesystem::exists(candidate, none)) library = candidate;
-  }
-  if (library.empty()) GTEST_SKIP() << "no libfaketime (Debian package libfaketime)";
-  const auto answerer = start_answerer("there", {"env", "LD_PRELOAD=" + library, "FAKETIME=+3600s",
-                                                 "FAKETIME_DONT_FAKE_MONOTONIC=1"});
+  if (find_faketime().empty()) GTEST_SKIP() << kNoFaketime;
+  const auto answerer = start_answerer("there", Words{"env"} + make_clock_words("FAKETIME=+3600s"));
   expect_findings(examine_there(), {"clock"}, "3.6e+03 s ahead");
 }
 

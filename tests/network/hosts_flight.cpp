@@ -6,6 +6,12 @@
 
 namespace sls::test {
 
+Figures HostsTest::expect_same(const std::string& profile, const std::string& file) const {
+  const Profile configured(*network_, profile);
+  Flight flight(file, configured.flight_options());
+  return test::expect_same(flight, file);
+}
+
 Profile::Profile(const Network& network, const std::string& name) : network_(network) {
   if (name == "unicast" || name == "wifi" || name == "secure") {
     std::string peers;

@@ -17,6 +17,16 @@ namespace sls::test {
 /// server.
 inline const std::vector<std::string> kHosts = {"server", "controller", "recorder", "directory"};
 
+/// Result of a flight.
+struct Figures {
+  double wall_s = 0.0;  ///< from step 0 to the end
+  double steps_per_s = 0.0;
+  double round_trip_p50_us = 0.0, round_trip_p99_us = 0.0;  ///< of the last 1,000 steps
+  std::uint64_t resent = 0;  ///< number of states that the server sent again
+  std::uint64_t rows_lost = 0;
+  bool is_identical = false;  ///< to the local flight: state.csv, reference.csv, certificate
+};
+
 /// A test on hosts; skipped where there can be none.
 class HostsTest : public testing::Test {
  protected:
@@ -26,6 +36,10 @@ class HostsTest : public testing::Test {
     if (const auto obstacle = Network::find_obstacle()) GTEST_SKIP() << *obstacle;
     network_ = std::make_unique<Network>(hosts_);
   }
+
+  /// Flies `file` with `profile`, one program on each host, and expects the flight of one process.
+  Figures expect_same(const std::string& profile,
+                      const std::string& file = scenario("short")) const;
 
   const std::vector<std::string> hosts_;
   std::unique_ptr<Network> network_;
@@ -52,16 +66,6 @@ class Profile {
   std::vector<std::string> environment_;
   FlightOptions options_;
   std::unique_ptr<Process> discovery_server_;
-};
-
-/// Result of a flight.
-struct Figures {
-  double wall_s = 0.0;  ///< from step 0 to the end
-  double steps_per_s = 0.0;
-  double round_trip_p50_us = 0.0, round_trip_p99_us = 0.0;  ///< of the last 1,000 steps
-  std::uint64_t resent = 0;  ///< number of states that the server sent again
-  std::uint64_t rows_lost = 0;
-  bool is_identical = false;  ///< to the local flight: state.csv, reference.csv, certificate
 };
 
 /// Reads the figures from the recording of a finished flight. @throws std::exception if there is

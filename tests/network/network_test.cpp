@@ -13,15 +13,7 @@ namespace {
 
 using namespace std::chrono_literals;
 
-class NetworkTest : public HostsTest {
- protected:
-  /// Flies `file` in one process and, with `profile`, on three hosts, and compares.
-  Figures expect_same(const std::string& profile, const std::string& file = scenario("short")) {
-    const Profile configured(*network_, profile);
-    Flight flight(file, configured.flight_options());
-    return test::expect_same(flight, file);
-  }
-};
+class NetworkTest : public HostsTest {};
 
 TEST_F(NetworkTest, ALinkThatLosesTwentyPercent) {
   network_->lose(0.2);
@@ -39,8 +31,9 @@ TEST_F(NetworkTest, WiresWithDelayAndJitterWherePacketsComeTwiceAndOutOfOrder) {
   for (const char* host : {"controller", "server", "recorder"}) {
     const std::string said = network_->end_wire(host);
     EXPECT_EQ(said.find(" 0 overtaken"), std::string::npos) << said;
-    if (host != std::string("controller"))
+    if (host != std::string("controller")) {
       EXPECT_EQ(said.find(" 0 duplicated"), std::string::npos) << said;
+    }
   }
 }
 

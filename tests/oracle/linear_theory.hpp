@@ -4,7 +4,6 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <complex>
-#include <functional>
 #include <unsupported/Eigen/MatrixFunctions>
 #include <vector>
 
@@ -40,25 +39,20 @@ struct SteadyError {
   Eigen::Array3d seen_rms() const { return (seen_amplitude.square() / 2 + mean.square()).sqrt(); }
 };
 
-/// Transfer function, evaluated at s = iw.
-using Transfer = std::function<std::complex<double>(const std::complex<double>& s)>;
-
 /// Steady error of small motions about hover, with drag, and with the force held over the period T:
 ///
 ///     horizontal  M p̈ + S q̈ = Z F − D (ṗ − v),   I q̈ + S p̈ + S g q = 0,   y = p + L q
 ///                 F = −M′ g′ q + (m′ L′ / g′) n [+ D (ṗ − v)],   n as in the law's (6) with
 ///                 ÿ = −g′ q, y⁽³⁾ = −g′ q̇ and the measured load at p + L′ q
 ///     vertical    M z̈ = M g − Z M′ (g′ − z̈_r + k_v ė′ + k_p e′),   e′ = e − (L − L′)
-///     hold        Z = H(T) e^(−sd) G,   H(T) = (1 − e^(−sT)) / (sT)
+///     hold        Z = H(T) e^(−sd),   H(T) = (1 − e^(−sT)) / (sT)
 ///     sensing     F uses p e^(−sa) H(P) instead of p, and the same for q
 ///
 /// M, S, I are the vehicle's mass and the pendulum's first and second moment about its joint. A
 /// dash marks values of the controller's model. d is the delay of the node; P and a are the period
-/// and age of the samples. G, `horizontal_lag`, is the response of vehicle and autopilot to a
-/// horizontal force. Evaluated at s = iw, with the frequency of each axis.
+/// and age of the samples. Evaluated at s = iw, with the frequency of each axis.
 inline SteadyError calc_steady_error(const config::Scenario& scenario,
-                                     const config::FigureEightReference& eight,
-                                     const Transfer& horizontal_lag = {}) {
+                                     const config::FigureEightReference& eight) {
   using Complex = std::complex<double>;
   const model::SlungLoadParameters& vehicle = scenario.vehicle;
   const model::SlungLoadParameters& believed = scenario.controller.model.vehicle;
@@ -93,7 +87,7 @@ inline SteadyError calc_steady_error(const config::Scenario& scenario,
   SteadyError error;
   for (int axis = 0; axis < 2; ++axis) {
     const Complex s(0.0, 2.0 * M_PI * (axis + 1) / eight.period_s);
-    const Complex held = calc_hold(s) * (horizontal_lag ? horizontal_lag(s) : 1.0);
+    const Complex held = calc_hold(s);
     const Complex seen_position = sample(s, sensing.body), seen_rod = sample(s, sensing.rod);
     const Complex of_error = xy.velocity * s + xy.position;  // part of −n
     const Complex by_position =

@@ -5,14 +5,14 @@ import hashlib
 import pickle
 import shutil
 
-import conftest
 import numpy as np
 import pytest
 import sls
 import yaml
+from places import ROOT, run_python
 from scipy.linalg import solve_continuous_are
 
-SHORT = conftest.ROOT / "config/scenarios/short.yaml"
+SHORT = ROOT / "config/scenarios/short.yaml"
 
 
 # --- scenarios ------------------------------------------------------------------------------------
@@ -80,7 +80,7 @@ def test_changes_that_no_scenario_has_are_refused(changes, message):
 # --- recordings -----------------------------------------------------------------------------------
 
 
-def test_a_recording_has_columns_by_name(tmp_path):
+def test_a_recording_has_what_its_flight_has(tmp_path):
     flight = sls.fly("short")
     recording = sls.Recording(flight.save(tmp_path / "r").folder)
     for table in ("state", "measured", "command", "reference"):
@@ -93,11 +93,7 @@ def test_a_recording_has_columns_by_name(tmp_path):
         recording.vehicle(1)
     with pytest.raises(sls.ConfigError, match="expected a recording"):
         sls.Recording(tmp_path)
-
-
-def test_a_recording_has_what_its_flight_has(tmp_path):
-    flight = sls.fly("short")
-    recording = flight.save(tmp_path / "r")
+    drawn = flight.plot().keys()
     for of in (recording, recording.vehicle(0)):
         for name in ("time_s", "quad_position", "quad_velocity", "load_position", "load_velocity", "alpha", "beta",
                      "applied_force", "force", "reference_position"):
@@ -106,7 +102,7 @@ def test_a_recording_has_what_its_flight_has(tmp_path):
         assert np.array_equal(of.calc_load_error(), flight.calc_load_error())
         assert of.attitude is None and of.body_rates is None
         assert [stage.label for stage in of.metrics] == [stage.label for stage in flight.metrics]
-        assert of.plot().keys() == flight.plot().keys() > {"positions"}
+        assert of.plot().keys() == drawn > {"positions"}
     assert repr(recording) == f"<sls.Recording {tmp_path / 'r'}: short, mission finished>"
 
 
@@ -167,8 +163,9 @@ def test_lqr_gains_fly_as_their_weights():
 # --- the package ----------------------------------------------------------------------------------
 
 
-def test_without_the_extension_module_the_rest_works(run_python, tmp_path):
+def test_without_the_extension_module_the_rest_works(monkeypatch, tmp_path):
     folder = sls.fly("short").save(tmp_path / "r").folder
+    monkeypatch.setenv("PYTHONPATH", str(ROOT / "python"))
     done = run_python(
         f"import sls\nrecording = sls.Recording({str(folder)!r})\nprint(recording.certificate)\n"
         "try: recording.state\n"
@@ -177,8 +174,7 @@ def test_without_the_extension_module_the_rest_works(run_python, tmp_path):
         "try: sls.fly('short')\n"
         "except ImportError as error: print(error)\n"
         "try: sls.Scenario\n"
-        "except ImportError as error: print(error)\n", path=str(conftest.ROOT / "python"),
-        cwd=tmp_path)
+        "except ImportError as error: print(error)\n", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     line = "expected the module _sls_core: run ./sls python or ./sls build"
     assert done.stdout.split("\n")[1:4] == [line, line, line]
@@ -193,7 +189,7 @@ def test_every_name_is_there_and_described():
         sls.flie
 
 
-def test_importing_the_package_reads_nothing_else(run_python):
+def test_importing_the_package_reads_nothing_else():
     done = run_python("import sys, sls\nprint([name for name in ('numpy', 'matplotlib', '_sls_core')"
                       " if name in sys.modules])")
     assert done.stdout == "[]\n", done.stderr

@@ -11,6 +11,7 @@ import time
 from unittest import mock
 
 import support
+from places import ROOT
 
 HERE = pathlib.Path(__file__).resolve().parent
 FAKE = HERE / "fake_core"
@@ -38,9 +39,14 @@ class CampaignTest(support.FolderTest):
         self.write("base.yaml", BASE)
         return self.write(name, CAMPAIGN.format(runs=runs) + extra)
 
+    def fly_whole(self, runs=40):
+        """Flies the campaign in one go, into the folder `whole`."""
+        self.write_campaign(runs)
+        self.fly("campaign.yaml", "--out", "whole")
+
     def environment(self, **more):
-        path = os.pathsep.join([str(self.core), str(support.ROOT / "python")])
-        return {**os.environ, "PYTHONPATH": path, "SLS_BUILD": str(support.BUILD.resolve()), **more}
+        path = os.pathsep.join([str(self.core), str(ROOT / "python")])
+        return {**os.environ, "PYTHONPATH": path, **more}
 
     def start(self, *arguments, fake="", **options):
         """Starts the command line in a separate process, in the test's folder."""

@@ -5,32 +5,20 @@ import csv
 import json
 import math
 import subprocess
-import sys
 import unittest
 import unittest.mock
 
-import support
+import sls
 import yaml
 from campaign_engine_support import CampaignTest
+from own_domain import OwnDomain
+from places import BUILD
 
-CORE = support.BUILD.resolve() / "python"
-if not list(CORE.glob("_sls_core*")):
-    print("skipped: expected the module _sls_core, got none (./sls build)")
-    sys.exit(77)
-sys.path.insert(0, str(CORE))
-
-BASE = """name: short
-vehicle: { quad_mass_kg: 1.5, load_mass_kg: 0.2, rod_length_m: 1.0, gravity_m_s2: 9.8 }
-plant: { model: analytic, step_s: 0.001, initial: { load_position_m: [0, 0, -0.5] } }
-sync: { mode: realtime, period_s: 0.004, real_time_factor: 1 }
-controller: { law: qsf, gains: { lqr: { horizontal: 10, vertical: 5 } }, force_limit_n: 200 }
-mission:
-  - set_point: { position_m: [0.5, 0, -0.5] }
-    for_s: 3
-faults:
-  - noise: { on: command, force_n: [0.1, 0.1, 0.1], seed: 0 }
-  - bias: { on: command, force_n: [0.1, 0, 0] }
-"""
+BASE = sls.load_scenario("short", changes={
+    "plant": {"model": "analytic", "step_s": 0.001, "initial": {"load_position_m": [0, 0, -0.5]}}, "sync.mode": "realtime",
+    "mission": [{"set_point": {"position_m": [0.5, 0, -0.5]}, "for_s": 3}],
+    "faults": [{"noise": {"on": "command", "force_n": [0.1, 0.1, 0.1], "seed": 0}},
+               {"bias": {"on": "command", "force_n": [0.1, 0, 0]}}]}).text
 # A push of 12 N loses the load, and the force limit of 5 N fails at once.
 CAMPAIGN = """base: base.yaml
 runs: 6
@@ -54,7 +42,7 @@ def end_x(flight):
 
 
 class FlightsTest(CampaignTest):
-    core = CORE
+    core = BUILD / "python"
 
     def write_campaign(self, extra=""):
         self.write("base.yaml", BASE)
@@ -66,7 +54,6 @@ class FlightsTest(CampaignTest):
 
     def fly_row(self, row):
         """Flies the run of `row` with the package, without a campaign."""
-        import sls
         paths = ("faults.1.bias.force_n", "controller.force_limit_n", "faults.0.noise.seed")
         return sls.fly(sls.load_scenario(self.folder / "base.yaml", changes={
             path: yaml.safe_load(row[path]) for path in paths}))
@@ -219,7 +206,7 @@ class FlightsTest(CampaignTest):
 
     def test_runs_flown_over_dds_have_the_same_certificates(self):
         self.write_campaign("certify: { some: 3, seed: 1 }\n")  # other runs get a certificate in the verification
-        with support.OwnDomain() as domain:
+        with OwnDomain() as domain:
             said = self.fly("campaign.yaml", "--out", "out", "--verify", 4, "--domain", domain)
             self.assertIn("verify: 4 of 4 runs have the same certificate when flown over DDS", said)
             verified = json.loads((self.folder / "out/manifest.json").read_text())["verified"]
@@ -230,7 +217,3 @@ class FlightsTest(CampaignTest):
                             domain, code=1)
             self.assertRegex(said, rf"verify: run \d: expected certificate {'0' * 64}, got [0-9a-f]{{64}}")
             self.assertIn("verify: 0 of 1 runs have the same certificate", said)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -17,15 +17,23 @@ import unittest
 import unittest.mock
 from pathlib import Path
 
-import support
 from campaign_engine_support import BASE, FAKE, CampaignTest
 
 sys.path.insert(0, str(FAKE))
 
 
 class LocalEngineTest(CampaignTest):
-    def test_the_table_has_every_run_in_order_and_measures_by_formula(self):
+    def setUp(self):
+        super().setUp()
         self.write_campaign(40)
+
+    def work(self, *arguments, code=0):
+        done = subprocess.run([sys.executable, "-BP", "-m", "sls.campaign.worker", "out", *arguments], cwd=self.folder,
+                              text=True, capture_output=True, env=self.environment())
+        self.assertEqual(done.returncode, code, done.stderr)
+        return done.stderr
+
+    def test_the_table_has_every_run_in_order_and_measures_by_formula(self):
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 7)
         rows = list(csv.DictReader(io.StringIO(self.read_table("out").decode())))
         self.assertEqual([row["run"] for row in rows], [str(run) for run in range(40)])
@@ -65,8 +73,7 @@ class LocalEngineTest(CampaignTest):
                          "--runs: expected runs from 0 to 29, got 10-30")
 
     def test_a_tenth_of_the_workers_killed_at_random_changes_nothing(self):
-        self.write_campaign(200)
-        self.fly("campaign.yaml", "--out", "whole")
+        self.fly_whole(200)
         flying = self.folder / "flying"
         flying.mkdir()
         process = self.start("campaign.yaml", "--out", "killed", "--workers", 3, "--chunk-runs", 5,
@@ -83,8 +90,7 @@ class LocalEngineTest(CampaignTest):
         self.assertEqual(self.read_table("killed"), self.read_table("whole"))
 
     def test_a_killed_campaign_is_resumed_to_the_same_bytes_and_leaves_no_process(self):
-        self.write_campaign(200)
-        self.fly("campaign.yaml", "--out", "whole")
+        self.fly_whole(200)
         process = self.start("campaign.yaml", "--out", "killed", "--workers", 2, "--chunk-runs", 5,
                              fake="sleep=0.01")
         self.wait_until(lambda: self.count_chunks("killed") >= 5, process)
@@ -107,8 +113,7 @@ class LocalEngineTest(CampaignTest):
     def test_ctrl_c_leaves_a_folder_that_resumes(self):
         from sls.campaign.whole_files import name_place
 
-        self.write_campaign(200)
-        self.fly("campaign.yaml", "--out", "whole")
+        self.fly_whole(200)
         for number, code in ((signal.SIGINT, 130), (signal.SIGTERM, 143)):
             out = f"stopped-{code}"
             process = self.start("campaign.yaml", "--out", out, "--workers", 2, "--chunk-runs", 5,
@@ -153,28 +158,24 @@ class LocalEngineTest(CampaignTest):
         self.assertIn("6 flown, 0 missing, 0 damaged", self.fly("status", "out"))
 
     def test_the_output_of_a_run_goes_to_stderr_and_changes_nothing(self):
-        self.write_campaign(40)
-        self.fly("campaign.yaml", "--out", "whole")
+        self.fly_whole()
         said = self.fly_apart("campaign.yaml", "--out", "out", "--chunk-runs", 5, fake="print=1")
         self.assertIn("printed by a library\n", said)
         self.assertEqual(self.read_table("out"), self.read_table("whole"))
 
     def test_a_run_that_kills_its_worker_once_is_flown_again(self):
-        self.write_campaign(40)
-        self.fly("campaign.yaml", "--out", "whole")
+        self.fly_whole()
         marker = self.folder / "marker"
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5, fake=f"kill-once=17:{marker}")
         self.assertTrue(marker.exists())
         self.assertEqual(self.read_table("out"), self.read_table("whole"))
 
     def test_a_run_that_kills_its_worker_each_time_is_named_when_all_others_are_flown(self):
-        self.write_campaign(40)
         said = self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5, fake="kill=17", code=1)
         self.expect_line(said, "chunk-000003.csv", "SIGKILL", "in run 17", "tried 3 times")
         self.assertEqual(self.count_chunks("out"), 7)
 
     def test_a_run_that_is_refused_in_flight_ends_the_campaign_and_is_named(self):
-        self.write_campaign(40)
         said = self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5, fake="refuse=17", code=2)
         self.expect_line(said, "run 17: base.yaml:2: vehicle.load_mass_kg: expected > 0")
 
@@ -197,7 +198,6 @@ class LocalEngineTest(CampaignTest):
         self.assertEqual(file.read_bytes(), before)
 
     def test_a_folder_of_another_campaign_or_in_use_is_refused(self):
-        self.write_campaign(40)
         self.fly("campaign.yaml", "--out", "out")
         self.write_campaign(41, name="other.yaml")
         said = self.fly("other.yaml", "--out", "out", "--resume", code=2)
@@ -233,7 +233,6 @@ class LocalEngineTest(CampaignTest):
                 first.close()
 
     def test_another_kind_of_machine_is_refused_unless_allowed_and_then_named(self):
-        self.write_campaign(40)
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
         plan_file = self.folder / "out/plan.json"
         plan = json.loads(plan_file.read_text())
@@ -250,7 +249,6 @@ class LocalEngineTest(CampaignTest):
         from sls.campaign.collect import collect
         from sls.campaign.folder import opened
         from sls.campaign.machine import host_name
-        self.write_campaign(40)
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
         with opened(self.folder / "out") as folder:
             rows = folder.read_chunk(7)
@@ -266,7 +264,6 @@ class LocalEngineTest(CampaignTest):
                                 for machine in machines.values()), [(1, True), (7, False)])
 
     def test_a_c_library_that_is_told_to_use_other_instructions_is_another_machine(self):
-        self.write_campaign(40)
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
         (self.folder / "out/chunks/chunk-000001.csv").unlink()
         with unittest.mock.patch.dict(os.environ, GLIBC_TUNABLES="glibc.cpu.hwcaps=-FMA"):
@@ -274,7 +271,6 @@ class LocalEngineTest(CampaignTest):
         self.expect_line(said, "tunables: expected none, got glibc.cpu.hwcaps=-FMA")
 
     def test_a_rebuilt_library_is_refused_until_its_bytes_are_those_of_the_plan(self):
-        self.write_campaign(40)
         self.write("base.yaml", BASE + "controller: { law: libraries/law.so }\n")
         self.write("libraries/law.so", "built")
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
@@ -283,10 +279,7 @@ class LocalEngineTest(CampaignTest):
         self.write("libraries/law.so", "rebuilt")
         said = self.fly("campaign.yaml", "--out", "out", "--resume", code=2)
         self.expect_line(said, "libraries/law.so: expected the file with which the campaign was begun (sha256 ")
-        done = subprocess.run([sys.executable, "-BP", "-m", "sls.campaign.worker", "out", "--chunks", "1"],
-                              cwd=self.folder, text=True, capture_output=True, env=self.environment())
-        self.assertEqual(done.returncode, 2, done.stderr)
-        self.assertIn("law.so: expected the file with which", done.stderr)
+        self.assertIn("law.so: expected the file with which", self.work("--chunks", "1", code=2))
         self.write("libraries/law.so", "built")
         self.fly("campaign.yaml", "--out", "out", "--resume")
         self.assertEqual(self.read_table("out"), table)
@@ -302,7 +295,6 @@ class LocalEngineTest(CampaignTest):
         self.assertEqual(calc_level("aarch64", set()), "aarch64")
 
     def test_mistakes_of_the_command_line_are_one_line(self):
-        self.write_campaign(40)
         for arguments, part in (
                 (("campaign.yaml", "--on", "clouds"), "--on: expected one of local, slurm, dask"),
                 (("nowhere",), "config/campaigns/nowhere.yaml"),
@@ -329,21 +321,13 @@ class LocalEngineTest(CampaignTest):
         self.assertFalse((self.folder / "out").exists())
 
     def test_worker_flies_listed_chunks(self):
-        self.write_campaign(40)
-        self.fly("campaign.yaml", "--out", "whole")
+        self.fly_whole()
         self.fly("campaign.yaml", "--out", "out", "--chunk-runs", 5)
         for file in (self.folder / "out/chunks").glob("*.csv"):
             file.unlink()
-
-        def work(*arguments, code=0):
-            done = subprocess.run([sys.executable, "-BP", "-m", "sls.campaign.worker", "out",
-                                   *arguments], cwd=self.folder, text=True, capture_output=True,
-                                  env=self.environment())
-            self.assertEqual(done.returncode, code, done.stderr)
-            return done.stderr
-        work("--chunks", "0-3")
+        self.work("--chunks", "0-3")
         self.assertEqual(self.count_chunks("out"), 4)
-        self.assertIn("expected a chunk from 0 to 7, got 8", work("--chunks", "8", code=2))
+        self.assertIn("expected a chunk from 0 to 7, got 8", self.work("--chunks", "8", code=2))
         self.fly("campaign.yaml", "--out", "out", "--resume")
         self.assertEqual(self.read_table("out"), self.read_table("whole"))
 
@@ -397,8 +381,7 @@ class FullDiskTest(CampaignTest):
         return apply
 
     def test_a_chunk_that_does_not_fit_is_one_line_and_leaves_nothing_that_looks_whole(self):
-        self.write_campaign(400)
-        self.fly("campaign.yaml", "--out", "whole")
+        self.fly_whole(400)
         process = self.start("campaign.yaml", "--out", "out", "--chunk-runs", 100,
                              preexec_fn=self.limit_files(8000))  # a chunk has about 15,000 bytes
         said = process.communicate(timeout=120)[1]
@@ -415,8 +398,7 @@ class FullDiskTest(CampaignTest):
                           capture_output=True).returncode:
             self.skipTest("expected root to mount a small disk")
         self.addCleanup(subprocess.run, ["umount", disk], check=True)
-        self.write_campaign(400)
-        self.fly("campaign.yaml", "--out", "whole")
+        self.fly_whole(400)
         said = self.fly("campaign.yaml", "--out", disk / "out", "--chunk-runs", 40, code=1)
         self.expect_line(said, disk, "expected to write it, got: No space left on device")
         self.assertEqual(list((disk / "out/chunks").glob(".*")), [])
@@ -456,7 +438,3 @@ def read_peak_mb(process):
     except (FileNotFoundError, ProcessLookupError):
         pass
     return 0.0
-
-
-if __name__ == "__main__":
-    unittest.main()

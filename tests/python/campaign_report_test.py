@@ -250,7 +250,6 @@ class ReportTest(CampaignTest):
         folder = self.folder / "c"
         self.write_campaign(rows=make_rows(100_000))
         code = ("import resource, sys, pathlib\n"
-                f"sys.path.insert(0, {str(support.ROOT / 'python')!r})\n"
                 "from sls.campaign.report import make_campaign_report\n"
                 "page = make_campaign_report(pathlib.Path(sys.argv[1]))\n"
                 "print(len(page.encode()),"
@@ -388,7 +387,3 @@ class CompareTest(CampaignTest):
                                 "nowhere/manifest.json")
         (a / "runs.csv").unlink()
         self.expect_input_error(lambda: compare(a, a), "a/runs.csv", "no such file")
-
-
-if __name__ == "__main__":
-    unittest.main()

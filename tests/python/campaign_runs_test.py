@@ -10,10 +10,10 @@ import subprocess
 import sys
 import threading
 import time
-import unittest
 
 import support
 import numpy as np
+from places import BUILD, ROOT
 
 import _sls_core
 from sls.campaign.campaign import MEASURES
@@ -21,7 +21,7 @@ from sls.input_error import InputError
 from sls.measures import measure
 from sls.recordings import Recording
 
-SCENARIOS = support.ROOT / "config/scenarios"
+SCENARIOS = ROOT / "config/scenarios"
 LONG = ("{ model: analytic, step_s: 0.004, initial: { load_position_m: [0, 0, -0.5] } }", "100000")
 """Values of the keys `plant` and `mission.0.for_s`: a flight of many seconds."""
 
@@ -33,7 +33,7 @@ class CampaignRunsTest(support.FolderTest):
         runs = _sls_core.Runs(str(SCENARIOS / f"{name}.yaml"), [path], list(MEASURES))
         outcome, reason, values, certificate, steps = runs.fly([value], True)
         scenario = self.write("run.yaml", runs.scenario_text([value]))
-        subprocess.run([support.BUILD / "bin/closed_loop", "--scenario", scenario, "--out",
+        subprocess.run([BUILD / "bin/closed_loop", "--scenario", scenario, "--out",
                         self.folder / "r"], capture_output=True, timeout=120, check=False)
         manifest = json.loads((self.folder / "r/manifest.json").read_text())
         self.assertEqual(certificate, manifest["certificate"])
@@ -129,10 +129,8 @@ class CampaignRunsTest(support.FolderTest):
 
     def test_ctrl_c_ends_a_flight(self):
         """The flight takes longer than the test waits."""
-        paths = [str(support.BUILD / "python"), str(support.ROOT / "python")]
         program = f"""
-import sys, threading
-sys.path[:0] = {paths!r}
+import threading
 import _sls_core
 runs = _sls_core.Runs({str(SCENARIOS / "figure_eight.yaml")!r}, ["plant", "mission.0.for_s"], [])
 try:
@@ -150,7 +148,3 @@ except KeyboardInterrupt:
                 self.assertEqual((said, process.returncode), ("interrupted\n", 0))
             finally:
                 process.kill()
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -4,7 +4,6 @@ import math
 import unittest
 from itertools import product
 
-import support  # noqa: F401  (paths)
 import numpy as np
 from scipy import optimize, stats
 
@@ -128,7 +127,3 @@ class PairedTest(unittest.TestCase):
         self.assertEqual((few.low, few.high), (-np.inf, np.inf))
         none = calc_paired_difference(a[6:], b[6:])
         self.assertEqual((none.count, none.p), (0, 1.0))
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -9,7 +9,7 @@ import textwrap
 import numpy as np
 import pytest
 import sls
-from conftest import PYTHON_PATH, ROOT
+from places import ROOT
 
 PLANT = {"model": "analytic", "step_s": 0.004,
          "initial": {"load_position_m": [0.0, 0.0, -0.5]}}
@@ -345,8 +345,7 @@ def test_a_fork_is_told_to_make_its_own():
 
 def test_the_example_learns_gains_with_which_the_law_in_cpp_flies_as_well():
     said = subprocess.run([sys.executable, "-B", ROOT / "examples/python/learn.py"], check=True,
-                          capture_output=True, text=True, timeout=120,
-                          env={**os.environ, "PYTHONPATH": PYTHON_PATH}).stdout
+                          capture_output=True, text=True, timeout=120).stdout
     errors = [float(number) for number in re.findall(r"rms error ([0-9.]+) m", said)]
     assert errors[-1] < 0.6 * errors[0], said
     assert errors[-1] == errors[-2], said  # the batch and the law in C++, printed to the millimetre

@@ -1,25 +1,9 @@
-"""Shared by the tests that pytest runs: places of the package and the programs."""
+"""Shared by the tests of the package."""
 
-import os
 import subprocess
-import sys
-from pathlib import Path
 
 import pytest
-
-ROOT = Path(__file__).resolve().parents[2]
-BUILD = Path(os.environ.get("SLS_BUILD", ROOT / "build"))
-sys.path[:0] = [str(ROOT / "python"), str(BUILD / "python")]
-PYTHON_PATH = os.pathsep.join(sys.path[:2])
-
-
-@pytest.fixture
-def run_python():
-    """A function that runs code in another Python with the package. It returns the finished process."""
-    def run(code, path=PYTHON_PATH, **options):
-        return subprocess.run(["/usr/bin/python3", "-B", "-c", code], capture_output=True, text=True,
-                              timeout=100, env={**os.environ, "PYTHONPATH": path}, **options)
-    return run
+from places import BUILD
 
 
 @pytest.fixture

@@ -2,7 +2,6 @@
 
 import unittest
 
-import support  # noqa: F401
 import numpy as np
 
 from sls.delay_formula import (HorizontalChain, Lateness, calc_error_ratio,
@@ -59,7 +58,3 @@ class DelayFormulaTest(unittest.TestCase):
                 limit = calc_stability_limit(make_chain(gains), lag_s)
                 for delay_s, roots in ((0.0, 0), (limit - 5e-4, 0), (limit + 5e-4, 2)):
                     self.assertEqual(count_unstable_roots(gains, Lateness(delay_s, lag_s)), roots)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,23 +1,14 @@
 """Runs the examples in Python like a user."""
 
-import os
 import re
-import subprocess
 
-import conftest
 import pytest
 import sls
-
-LAUNCHER = conftest.ROOT / "sls"
+from places import ROOT, launch
 
 
 def run_example(name, *arguments, folder):
-    done = subprocess.run(
-        [LAUNCHER, "python", conftest.ROOT / "examples/python" / name, *map(str, arguments)],
-        cwd=folder, capture_output=True, text=True, timeout=200,
-        env={**os.environ, "SLS_BUILD": str(conftest.BUILD), "MPLCONFIGDIR": str(folder)})
-    assert done.returncode == 0, done.stdout + done.stderr
-    return done.stdout
+    return launch("python", ROOT / "examples/python" / name, *arguments, cwd=folder).stdout
 
 
 def test_pid_flies_as_the_law_in_cpp(tmp_path):
@@ -44,20 +35,16 @@ def test_compare_laws_leaves_recordings_that_verify(tmp_path):
 
 
 def test_the_readme_lists_every_example():
-    listed = (conftest.ROOT / "python/README.md").read_text()
-    for file in (conftest.ROOT / "examples/python").glob("*.py"):
+    listed = (ROOT / "python/README.md").read_text()
+    for file in (ROOT / "examples/python").glob("*.py"):
         assert f"`{file.name}`" in listed, file.name
 
 
 def test_the_launcher_starts_python_with_the_package(tmp_path):
-    done = subprocess.run([LAUNCHER, "python", "-c", "import sls; print(sls.fly('short'))"],
-                          cwd=tmp_path, capture_output=True, text=True, timeout=100,
-                          env={**os.environ, "SLS_BUILD": str(conftest.BUILD)})
+    done = launch("python", "-c", "import sls; print(sls.fly('short'))", cwd=tmp_path)
     assert done.stdout == "<sls.Flight short: 501 steps, finished>\n", done.stderr
 
 
 @pytest.mark.parametrize("code, exit_code", [("raise SystemExit(3)", 3), ("1/0", 1)])
 def test_the_launcher_passes_the_exit_code_on(code, exit_code, tmp_path):
-    done = subprocess.run([LAUNCHER, "python", "-c", code], cwd=tmp_path, capture_output=True,
-                          env={**os.environ, "SLS_BUILD": str(conftest.BUILD)}, timeout=100)
-    assert done.returncode == exit_code
+    launch("python", "-c", code, cwd=tmp_path, code=exit_code)

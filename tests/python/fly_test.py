@@ -9,10 +9,10 @@ import subprocess
 import threading
 import time
 
-import conftest
 import numpy as np
 import pytest
 import sls
+from places import BUILD, ROOT, run_python
 
 # Noise on the measured state, and a delay of the command.
 FAULTS = [{"noise": {"on": "state", "position_m": [0.01, 0.02, 0.03], "seed": 7}},
@@ -83,7 +83,7 @@ def test_a_flight_has_the_columns_of_the_programs_files(name, fly_with_program, 
     recording = flight.save(tmp_path / "saved")
     assert recording.certificate == manifest["certificate"]
     for folders in ((tmp_path / "saved",), (tmp_path / "saved", folder)):
-        judged = subprocess.run([conftest.BUILD / "bin/sls_verify", *folders], capture_output=True,
+        judged = subprocess.run([BUILD / "bin/sls_verify", *folders], capture_output=True,
                                 text=True, timeout=100)
         assert judged.returncode == 0, judged.stdout + judged.stderr
     assert sorted(file.name for file in (tmp_path / "saved").iterdir()) == sorted(
@@ -195,8 +195,8 @@ def test_errors_are_exceptions_with_the_texts_of_the_programs(fly_with_program, 
     (tmp_path / "full/notes.txt").write_text("mine")
     with pytest.raises(sls.ConfigError) as error:
         flight.save(tmp_path / "full")
-    done = subprocess.run([conftest.BUILD / "bin/closed_loop", "--scenario",
-                           conftest.ROOT / "config/scenarios/short.yaml", "--out",
+    done = subprocess.run([BUILD / "bin/closed_loop", "--scenario",
+                           ROOT / "config/scenarios/short.yaml", "--out",
                            tmp_path / "full"], capture_output=True, text=True, timeout=100)
     assert done.returncode == 2 and str(error.value) in done.stderr
     flight.save(tmp_path / "r")
@@ -208,7 +208,7 @@ def test_errors_are_exceptions_with_the_texts_of_the_programs(fly_with_program, 
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
-def test_a_disk_that_refuses_is_an_os_error(run_python, tmp_path):
+def test_a_disk_that_refuses_is_an_os_error(tmp_path):
     code = ("import resource, signal, sls\n"
             "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
             "flight = sls.fly('short')\n"
@@ -262,8 +262,7 @@ def test_ctrl_c_ends_a_flight_within_a_fifth_of_a_second(law):
     delays = []
     for _ in range(5):  # other processes may hold the processors
         child = subprocess.Popen(["/usr/bin/python3", "-B", "-c", INTERRUPTED.replace("LAW", law)],
-                                 stdout=subprocess.PIPE, text=True,
-                                 env={**os.environ, "PYTHONPATH": conftest.PYTHON_PATH})
+                                 stdout=subprocess.PIPE, text=True)
         assert child.stdout.readline() == "flying\n"
         cpu = wait_for_work(child.pid)
         sent = time.monotonic()

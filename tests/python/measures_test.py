@@ -3,7 +3,6 @@ campaign_runs_test.py compares flights with campaigns."""
 
 import json
 import math
-import unittest
 
 import support
 
@@ -119,7 +118,3 @@ class MeasuresTest(support.FolderTest):
         for name, kind in MEASURES.items():
             self.assertTrue(name.endswith(ends[kind.unit]), name)
             self.assertNotIn("\n", kind.description)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -3,7 +3,6 @@
 import math
 import unittest
 
-import support
 import numpy as np
 
 from sls import metrics
@@ -17,6 +16,11 @@ def make_flight(time_s, p_WL, reference, stages):
                   np.full((len(time_s), 3), np.nan), stages, period_s=time_s[1] - time_s[0])
 
 
+def make_still_flight(time_s, *stages):
+    zeros = np.zeros((len(time_s), 3))
+    return make_flight(time_s, zeros, zeros, stages)
+
+
 def list_laps(flight):
     """Label, first and last row of the laps of the first stage."""
     return [(lap.label, lap.rows[0], lap.rows[-1])
@@ -27,16 +31,13 @@ class StageMetricsTest(unittest.TestCase):
     def test_laps_are_those_of_the_recorder(self):
         # Two laps of 16 s at 4 ms, from 0.004 s · 100 on. The last row belongs to the second lap.
         time_s = np.arange(100, 8101) * 0.004
-        zeros = np.zeros((8001, 3))
-        flight = make_flight(time_s, zeros, zeros, (Stage(0, "eight", 0, 8001, 0.4, 32, 16),))
+        flight = make_still_flight(time_s, Stage(0, "eight", 0, 8001, 0.4, 32, 16))
         self.assertEqual(list_laps(flight), [("lap 1", 0, 3999), ("lap 2", 4000, 8000)])
 
     def test_a_lap_that_the_rows_do_not_span_is_marked(self):
         def list_of(first, last, duration_s):
             time_s = np.arange(first, last + 1) * 0.004
-            zeros = np.zeros((len(time_s), 3))
-            return list_laps(make_flight(time_s, zeros, zeros, (
-                Stage(0, "eight", 0, len(time_s), 0, duration_s, 16),)))
+            return list_laps(make_still_flight(time_s, Stage(0, "eight", 0, len(time_s), 0, duration_s, 16)))
 
         self.assertEqual(list_of(0, 6000, 24),
                          [("lap 1", 0, 3999), ("lap 2 (part)", 4000, 6000)])
@@ -50,24 +51,20 @@ class StageMetricsTest(unittest.TestCase):
 
     def test_laps_shorter_than_a_period_make_no_endless_table(self):
         time_s = np.arange(0, 3000) * 0.004
-        zeros = np.zeros((3000, 3))
         for lap_s, count in ((0.004, 1000), (1e-9, 1)):
-            flight = make_flight(time_s, zeros, zeros, (Stage(0, "eight", 0, 3000, 0, 12, lap_s),))
+            flight = make_still_flight(time_s, Stage(0, "eight", 0, 3000, 0, 12, lap_s))
             self.assertEqual(len(list_laps(flight)), count)
 
     def test_a_step_whose_beginning_was_not_recorded_is_none(self):
         time_s = np.arange(100, 300) * 0.1
-        zeros = np.zeros((200, 3))
         for start_s, is_step in ((10.0, True), (9.9, False)):
-            flight = make_flight(time_s, zeros, zeros, (Stage(0, "hold", 0, 200, start_s),))
+            flight = make_still_flight(time_s, Stage(0, "hold", 0, 200, start_s))
             found, = metrics.calc_stage_metrics(flight)
             self.assertEqual(found.step is not None, is_step)
 
     def test_a_stage_that_another_follows_keeps_its_last_row_in_its_lap(self):
         time_s = np.arange(0, 301) * 0.01
-        zeros = np.zeros((301, 3))
-        flight = make_flight(time_s, zeros, zeros, (Stage(0, "eight", 0, 200, 0, 2, 1),
-                                                    Stage(1, "hold", 200, 301, 2)))
+        flight = make_still_flight(time_s, Stage(0, "eight", 0, 200, 0, 2, 1), Stage(1, "hold", 200, 301, 2))
         self.assertEqual(list_laps(flight), [("lap 1", 0, 99), ("lap 2", 100, 199)])
         labels = [found.label for found in metrics.calc_stage_metrics(flight)]
         self.assertEqual(labels, ["0 eight", "lap 1", "lap 2", "1 hold"])
@@ -111,7 +108,3 @@ class StageMetricsTest(unittest.TestCase):
         np.testing.assert_array_equal(calc_rod(np.zeros(1), np.zeros(1)), [[0, 0, 1]])
         rods = calc_rod(np.linspace(-1, 1, 9), np.linspace(1, -1, 9))
         np.testing.assert_allclose(np.linalg.norm(rods, axis=1), 1, atol=1e-15)
-
-
-if __name__ == "__main__":
-    unittest.main()

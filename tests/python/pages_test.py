@@ -14,13 +14,14 @@ import support
 import numpy as np
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from places import BUILD, ROOT
 from sls import figures
 from sls.recordings import Recording
 from support import write_recording
 
 LONG = "_figure_eight_with_a_heavier_load_a_delay_and_a_gust_from_the_north"[:63]
 NO_SCENE = "sls: report without its scene: "
-VIEWER, FLYER = support.BUILD / "bin/sls_view", support.BUILD / "bin/closed_loop"
+VIEWER, FLYER = BUILD / "bin/sls_view", BUILD / "bin/closed_loop"
 os.environ.pop("SLS_VIEW", None)  # only tests of the scene use sls_view
 
 ALL = {"positions", "errors", "path", "angles", "forces", "attitude"}
@@ -39,6 +40,9 @@ def without_drawing(test):
 
 
 class PlotTest(support.FolderTest):
+    def load(self, **what):
+        return Recording(write_recording(self.folder / "r", **what)).load_flight(0, "r")
+
     def test_one_recording_gives_every_figure_as_png_and_pdf_beside_it(self):
         write_recording(self.folder / "r")
         code, output = self.run_sls("plot", "r")
@@ -102,23 +106,21 @@ class PlotTest(support.FolderTest):
         self.assertEqual(names_of(self.folder / "o", "png"), BODY)
 
     def test_load_and_quadrotor_have_one_colour_each_in_scene_and_figures(self):
-        write_recording(self.folder / "r", last=50)
-        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flight = self.load(last=50)
         drawn = figures.make_figures([flight])
-        colours = dict(re.findall(r"--(\w+): (#\w+)", (support.ROOT / "python/sls/colours.css").read_text()))
+        colours = dict(re.findall(r"--(\w+): (#\w+)", (ROOT / "python/sls/colours.css").read_text()))
         lines = {line.get_label(): line.get_color() for line in drawn["positions"].axes[0].lines}
         self.assertEqual((lines["load"], lines["quadrotor"], lines["reference"]),
                          (colours["load"], colours["quad"], colours["reference"]))
         self.assertEqual(drawn["errors"].axes[0].lines[0].get_color(), colours["load"])
         self.assertEqual(drawn["forces"].axes[0].lines[0].get_color(), colours["quad"])
-        style = "".join(file.read_text() for file in (support.ROOT / "tools/view/page/src").rglob("*.css"))
+        style = "".join(file.read_text() for file in (ROOT / "tools/view/page/src").rglob("*.css"))
         self.assertIn("python/sls/colours.css", style)
         for colour in colours.values():
             self.assertNotIn(colour, style)
 
     def test_flights_drawn_together_differ_in_line_style_too(self):
-        write_recording(self.folder / "r", last=50)
-        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flight = self.load(last=50)
         flights = [replace(flight, name=str(number)) for number in range(9)]
         for name, figure in figures.make_figures(flights).items():
             lines = [line for line in figure.axes[0].lines if line.get_label() != "reference"]
@@ -144,15 +146,13 @@ class PlotTest(support.FolderTest):
         self.expect_refused(["plot", "r", "--paper", "9"], "--paper: expected 0.5 to 4 columns, got '9'")
 
     def test_an_error_that_is_always_0_has_no_logarithmic_axis(self):
-        write_recording(self.folder / "r", last=50)  # a set-point: no error in x and y
-        figure = figures.make_figures([Recording(self.folder / "r").load_flight(0, "r")])["errors"]
+        figure = figures.make_figures([self.load(last=50)])["errors"]  # a set-point: no error in x and y
         self.assertEqual([axes.get_yscale() for axes in figure.axes], ["linear"] * 5 + ["log"])
         self.assertEqual([text.get_text() for text in figure.axes[1].texts], ["0 at every step"])
         self.assertEqual(list(figure.axes[1].get_yticks()), [])
 
     def test_long_names_stay_within_the_figure(self):
-        write_recording(self.folder / "r", last=50)
-        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flight = self.load(last=50)
         for paper in (None, 1.0):
             flights = [replace(flight, name=f"{number}{LONG}") for number in range(5)]
             figure = figures.make_figures(flights, (), paper)["errors"]
@@ -162,8 +162,7 @@ class PlotTest(support.FolderTest):
             self.assertGreater(legend.y0, max(axes.get_window_extent().y1 for axes in figure.axes))
 
     def test_commanded_and_actual_motion_are_drawn_together(self):
-        write_recording(self.folder / "r", last=50, rotors=4)
-        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flight = self.load(last=50, rotors=4)
         drawn = figures.make_figures([flight])
         for name, rows in (("body_attitude", 3), ("rotors", 4), ("thrust", 1)):
             all_axes = drawn[name].axes
@@ -187,8 +186,7 @@ class PlotTest(support.FolderTest):
         np.testing.assert_allclose(rate, np.degrees(-0.2))
 
     def test_every_stage_is_marked_on_all_axes(self):
-        write_recording(self.folder / "r", last=600)
-        flight = Recording(self.folder / "r").load_flight(0, "r")
+        flight = self.load(last=600)
         eight = flight.stages[1]
         flight = replace(flight, stages=(*flight.stages[:1], replace(eight, end=500),
                                          replace(eight, index=2, first=500)))
@@ -327,7 +325,7 @@ class SceneTest(support.FolderTest):
 
     def fly(self, name, text=None):
         """Flies a shipped scenario, or `text`. Returns the recording's folder."""
-        text = text or (support.ROOT / f"config/scenarios/{name}.yaml").read_text()
+        text = text or (ROOT / f"config/scenarios/{name}.yaml").read_text()
         scenario = self.write(f"{name}.yaml", text)
         subprocess.run([FLYER, "--scenario", scenario, "--out", self.folder / name], check=True,
                        capture_output=True, timeout=200)
@@ -379,13 +377,13 @@ class SceneTest(support.FolderTest):
     @unittest.skipUnless(VIEWER.exists() and FLYER.exists(), "skipped: no sls_view in this build")
     @without_drawing
     def test_scenes_of_long_flights_stay_within_4_mb(self):
-        text = (support.ROOT / "config/scenarios/figure_eight.yaml").read_text()
+        text = (ROOT / "config/scenarios/figure_eight.yaml").read_text()
         self.expect_large_scene(self.fly("long", re.sub(r"for_s: \d+", "for_s: 160", text)))
 
     @unittest.skipUnless(FLYER.exists(), "skipped: no closed_loop in this build")
     @without_drawing
     def test_one_load_on_cables_is_told_once_with_its_cables(self):
-        text = (support.ROOT / "config/scenarios/cable_cut.yaml").read_text()
+        text = (ROOT / "config/scenarios/cable_cut.yaml").read_text()
         name = self.fly("cable_cut", text.replace("release_s: 8", "release_s: 1").replace("for_s: 22", "for_s: 2"))
         flights = Recording(self.folder / name).load_fleet()
         drawn = figures.make_figures(flights[:1], flights)
@@ -407,7 +405,3 @@ class SceneTest(support.FolderTest):
         page, output = self.make_report(name, VIEWER)
         self.assertEqual(page.read_text().count("<iframe"), 1, output)
         self.assertGreater(page.stat().st_size, 2_000_000)  # the scene uses the allowed bytes
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -3,13 +3,10 @@
 import json
 import os
 import subprocess
-import sys
 
-import conftest
 import pytest
-
-sys.path.insert(0, str(conftest.ROOT / "tests/support"))
-from own_domain import OwnDomain  # noqa: E402
+from own_domain import OwnDomain
+from places import ROOT
 
 
 @pytest.fixture(scope="module")
@@ -22,8 +19,7 @@ def python(tmp_path_factory):
         pytest.skip("this machine has no module venv (apt-get install python3-venv)")
     python = folder / "venv/bin/python"
     done = subprocess.run([python, "-m", "pip", "install", "--no-index", "--no-build-isolation",
-                           conftest.ROOT / "python"], capture_output=True, text=True, cwd=folder,
-                          env={**os.environ, "SLS_BUILD": str(conftest.BUILD)})
+                           ROOT / "python"], capture_output=True, text=True, cwd=folder)
     assert done.returncode == 0, done.stdout + done.stderr
     return python
 

@@ -5,7 +5,6 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-import conftest
 import pytest
 
 pytest_plugins = ["pytester"]
@@ -25,9 +24,8 @@ expect:
 
 
 @pytest.fixture
-def run(pytester, monkeypatch):
+def run(pytester):
     """A function that runs pytest with the plug-in on the text of a test file, and returns the result."""
-    monkeypatch.setenv("PYTHONPATH", conftest.PYTHON_PATH)
     pytester.makepyfile(law=LAW)
     for name, most in (("wide", 2), ("narrow", 0.01)):
         (pytester.path / f"{name}.yaml").write_text(CHECK.format(most=most))

@@ -3,10 +3,10 @@
 import importlib.util
 import threading
 
-import conftest
 import numpy as np
 import pytest
 import sls
+from places import ROOT
 
 WEIGHT_N = 1.7 * 9.8  # of the scenario `short`
 HOVER = [{"hold": {"position_m": [0, 0, -0.5]}, "for_s": 1.0}]
@@ -14,7 +14,7 @@ HOVER = [{"hold": {"position_m": [0, 0, -0.5]}, "for_s": 1.0}]
 
 def load_example(name):
     spec = importlib.util.spec_from_file_location(
-        name, conftest.ROOT / f"examples/python/{name}.py")
+        name, ROOT / f"examples/python/{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -207,27 +207,16 @@ def test_a_law_without_a_force_fails_the_flight():
         sls.LawFault("tired")
 
 
-class NegativeMemory:
-    memory_size = -1
-
-    def __call__(self, now):
-        return (0.0, 0.0, 0.0), ()
-
-
-class LargeMemory(NegativeMemory):
-    memory_size = 65
-
-
-class TextMemory(NegativeMemory):
-    memory_size = "3"
+def make_law(size):
+    return type("Law", (), {"memory_size": size, "__call__": lambda self, now: ((0.0, 0.0, 0.0), ())})()
 
 
 @pytest.mark.parametrize("controller, message", [
     (3, "controller: expected an object that can be called with sls.Now, got 3"),
     (Counter, "controller: expected an object that can be called"),
-    (NegativeMemory(), "NegativeMemory.memory_size: expected a whole number from 0 to 64, got -1"),
-    (LargeMemory(), "LargeMemory.memory_size: expected a whole number from 0 to 64, got 65"),
-    (TextMemory(), "TextMemory.memory_size: expected a whole number from 0 to 64, got '3'"),
+    (make_law(-1), "Law.memory_size: expected a whole number from 0 to 64, got -1"),
+    (make_law(65), "Law.memory_size: expected a whole number from 0 to 64, got 65"),
+    (make_law("3"), "Law.memory_size: expected a whole number from 0 to 64, got '3'"),
 ])
 def test_an_invalid_law_is_refused_before_the_flight(controller, message):
     with pytest.raises(sls.ConfigError) as error:

@@ -3,7 +3,6 @@ fleets."""
 
 import json
 import shutil
-import unittest
 
 import support
 import numpy as np
@@ -107,6 +106,13 @@ class RecordingsTest(support.FolderTest):
         np.testing.assert_allclose(second.max_m, 0.001, rtol=1e-9)
         self.assertIsNone(eight.step)
 
+    def test_laps_count_from_the_start_of_a_stage_that_the_recorder_joined_late(self):
+        write_recording(self.folder / "r", first=450)
+        self.change("manifest.json", lambda text: json.dumps(
+            {**json.loads(text), "stage_starts": [{"vehicle_id": 0, "stage": 1, "step": 400}]}))
+        _, first, second = calc_stage_metrics(self.load())
+        self.assertEqual([first.label, first.from_s, second.label, second.from_s], ["lap 1 (part)", 4.5, "lap 2", 6.0])
+
     def test_a_killed_recorder_leaves_what_is_read_and_said(self):
         write_recording(self.folder / "r", last=150, complete=False)
         self.change("state.csv", lambda text: text[:-30])
@@ -139,17 +145,11 @@ class RecordingsTest(support.FolderTest):
             line for line in text.split("\n") if line[:6] not in ("0,200,", "0,201,", "0,202,")))
         flight = self.load()
         self.assertIn("3 samples missing, first sls/reference step 200 of vehicle 0", flight.notes)
+        self.change("manifest.json", lambda text: json.dumps(
+            {**json.loads(text), "further_missing": {"gaps": 2, "samples": 40}}))  # which it does not list
+        self.assertIn("43 samples missing, first sls/reference step 200 of vehicle 0", self.load().notes)
         self.assertEqual(list(np.flatnonzero(np.isnan(flight.p_WL_ref[:, 0]))), [200, 201, 202])
         self.assertEqual(len(flight.stages), 2)
-
-    def test_gaps_that_the_manifest_does_not_list_are_counted(self):
-        write_recording(self.folder / "r", complete=False, missing=[
-            {"vehicle_id": 0, "topic": "sls/reference", "from": 200, "to": 202}])
-        file = self.folder / "r/manifest.json"
-        manifest = json.loads(file.read_text())
-        file.write_text(json.dumps({**manifest, "further_missing": {"gaps": 2, "samples": 40}}))
-        self.assertIn("43 samples missing, first sls/reference step 200 of vehicle 0",
-                      self.load().notes)
 
     def test_the_last_status_may_be_in_an_earlier_segment(self):
         write_recording(self.folder / "r", last=150, complete=False)
@@ -230,7 +230,3 @@ class RecordingsTest(support.FolderTest):
             del manifest[key]
         (folder / "manifest.json").write_text(json.dumps(manifest))
         self.assertEqual(len(self.load().time_s), 2 * STEPS_PER_STAGE + 1)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -4,14 +4,12 @@ flights. Takes minutes: `./sls test --slow`."""
 import contextlib
 import csv
 import math
-import os
 import pathlib
-import subprocess
 import tempfile
 import unittest
 
-import support
 import numpy as np
+from places import launch
 
 from delay_formula_test import GAINS, solve_error_ratio
 from sls import study
@@ -41,11 +39,7 @@ class StudyTest(unittest.TestCase):
     def setUpClass(cls):
         with contextlib.ExitStack() as stack:
             cls.folder = pathlib.Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            done = subprocess.run(
-                [support.ROOT / "sls", "study", "--out", "s", "--recordings", "r"], cwd=cls.folder, env={**os.environ, "SLS_BUILD": support.BUILD},
-                capture_output=True, text=True, timeout=1500)
-            if done.returncode != 0:
-                raise AssertionError(done.stdout + done.stderr)
+            launch("study", "--out", "s", "--recordings", "r", cwd=cls.folder, timeout=1500)
             cls.addClassCleanup(stack.pop_all().close)
         cls.page = (cls.folder / "s/study.md").read_text()
 
@@ -102,7 +96,3 @@ class StudyTest(unittest.TestCase):
                                  ("`px4_fitted`", "a step of 0.2 m")):
             self.assertGreater(margins[vehicle, mission, "reversed"],
                                margins[vehicle, mission, "right"] + 0.05)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,34 +1,13 @@
-"""Shared by the tests of the package. The argument of a test is the build folder. If a module that the
-package needs is missing, the test is skipped (exit code 77)."""
+"""Shared by the tests of the package."""
 
 import contextlib
-import importlib.util
 import io
 import json
-import os
-import pathlib
 import re
-import sys
-import tempfile
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-BUILD = pathlib.Path(sys.argv.pop(1)) if len(sys.argv) > 1 else ROOT / "build"
-sys.path[:0] = [str(ROOT / "python"), str(BUILD / "python"), str(ROOT / "tests/support")]
-CACHE = tempfile.TemporaryDirectory()
-os.environ.setdefault("MPLCONFIGDIR", CACHE.name)  # matplotlib must not write into the home folder
-
-try:
-    import matplotlib  # noqa: F401
-    import numpy as np
-    import yaml  # noqa: F401
-    if importlib.util.find_spec("_sls_core") is None:  # not loaded: some tests replace it
-        raise ImportError("No module named '_sls_core'")
-except ImportError as error:
-    print(f"skipped: {error} (apt-get install python3-numpy python3-matplotlib python3-yaml; ./sls build)")
-    sys.exit(77)
-
-import folder_test  # noqa: E402
-from own_domain import OwnDomain  # noqa: E402, F401
+import folder_test
+import numpy as np
+from places import ROOT
 
 
 class FolderTest(folder_test.FolderTest):

@@ -3,7 +3,6 @@
 import io
 import os
 import sys
-import unittest
 from contextlib import redirect_stderr, redirect_stdout
 
 import support
@@ -53,7 +52,3 @@ class WorldsPlotTest(support.FolderTest):
         with redirect_stderr(io.StringIO()) as said:
             self.assertEqual(worlds_plot.main(["--plot", "worlds.gif"]), 2)
         self.assertEqual(said.getvalue(), "worlds: --plot: expected a file .png, .svg or .pdf, got 'worlds.gif'\n")
-
-
-if __name__ == "__main__":
-    unittest.main()

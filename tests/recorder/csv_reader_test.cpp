@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "recorder/sinks/csv/csv_file.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::record {
@@ -22,12 +23,7 @@ class CsvReaderTest : public testing::Test {
     return rows;
   }
   std::string find_error(const std::string& bytes) {
-    try {
-      read(bytes);
-    } catch (const DamagedError& error) {
-      return error.what();
-    }
-    return "no error";
+    return sls::test::find_error<DamagedError>([&] { read(bytes); });
   }
 
   const sls::test::TemporaryFolder folder_;

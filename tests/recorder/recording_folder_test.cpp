@@ -3,11 +3,11 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include <cstdlib>
 #include <iostream>
 
 #include "common/config/config_error.hpp"
 #include "tests/recorder/flights.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::record {
@@ -45,16 +45,13 @@ class RecordingFolderTest : public testing::Test {
   const fs::path out_ = root_ / "out";
 };
 
-TEST_F(RecordingFolderTest, ANewFolderIsMade) {
-  EXPECT_EQ(find_error(out_), "no error");
-  EXPECT_TRUE(fs::is_directory(out_));
-  EXPECT_TRUE(fs::is_empty(out_));
-}
-
-TEST_F(RecordingFolderTest, FoldersOnTheWayAreMadeToo) {
-  EXPECT_EQ(find_error(out_ / "a/b/c"), "no error");
-  EXPECT_TRUE(fs::is_directory(out_ / "a/b/c"));
-  EXPECT_EQ(find_error(out_ / "with/slash/"), "no error");
+TEST_F(RecordingFolderTest, ANewFolderAndThoseOnTheWayAreMade) {
+  for (const fs::path& folder : {out_, out_ / "a/b/c", out_ / "with/slash/"}) {
+    EXPECT_EQ(find_error(folder), "no error");
+    EXPECT_TRUE(fs::is_directory(folder));
+    EXPECT_TRUE(fs::is_empty(folder));
+    fs::remove_all(out_);
+  }
 }
 
 TEST_F(RecordingFolderTest, AFolderWithoutARecordingIsRemovedAgain) {
@@ -129,17 +126,11 @@ TEST_F(RecordingFolderTest, ForceRefusesAFolderThatIsCalledLikeAFileAndRemovesNo
   }
 }
 
-TEST_F(RecordingFolderTest, ForceReplacesSegmentsAndFurtherRunsToo) {
+TEST_F(RecordingFolderTest, ForceReplacesSegmentsFurtherRunsFiguresAndReportToo) {
   for (const char* subfolder :
        {"", "segment-2", "run-0123456789abcdef", "run-0123456789abcdef/segment-10"})
     fill(out_ / subfolder);
-  EXPECT_EQ(find_error(out_, true), "no error");
-  EXPECT_TRUE(fs::is_empty(out_));
-}
-
-TEST_F(RecordingFolderTest, ForceReplacesFiguresAndReportToo) {
   for (const char* subfolder : {"", "run-0123456789abcdef"}) {
-    fill(out_ / subfolder);
     write_bytes(out_ / subfolder / "report.html", "old");
     fs::create_directory(out_ / subfolder / "figures");
     for (const char* figure : {"positions.png", "positions.pdf", "fleet.png", "body_rates.pdf"})
@@ -173,13 +164,10 @@ TEST_F(RecordingFolderTest, ForceRefusesSubfoldersWithAnythingElseAndRemovesNoth
 class ResumeTest : public RecordingFolderTest {
  protected:
   std::string find_resume_error() {
-    try {
-      find_unfinished_recording(out_);
-    } catch (const config::ConfigError& error) {
-      EXPECT_EQ(std::string(error.what()).find('\n'), std::string::npos) << error.what();
-      return error.what();
-    }
-    return "no error";
+    const std::string error =
+        sls::test::find_error<config::ConfigError>([&] { find_unfinished_recording(out_); });
+    EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    return error;
   }
 };
 

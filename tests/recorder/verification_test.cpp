@@ -11,6 +11,7 @@
 
 #include "common/config/config_error.hpp"
 #include "tests/recorder/flights.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/text.hpp"
 
@@ -213,12 +214,8 @@ TEST_F(VerificationTest, AMalformedRowIsNamedWithItsLineUnlessADifferenceComesFi
   change("state.csv", 90, 3, [](auto&) { return "1.2.3"; });
   const std::string place = (b_ / "state.csv").string() + ":90: quad_x_m: expected a number";
   EXPECT_NE(find_problems(b_).find(place), std::string::npos) << find_problems(b_);
-  try {
-    find_difference();
-    FAIL() << "no error";
-  } catch (const DamagedError& error) {
-    EXPECT_EQ(error.what(), place + ", got '1.2.3'");
-  }
+  EXPECT_EQ(sls::test::find_error<DamagedError>([&] { find_difference(); }),
+            place + ", got '1.2.3'");
   change("command.csv", 50, 3, to_next);
   EXPECT_EQ(find_difference().find("command.csv, vehicle 0, step 48"), 0u);
 }
@@ -379,13 +376,9 @@ TEST_F(VerificationTest, AManifestsNumbersAreWholeNumbersThatFit) {
     ASSERT_NE(at, std::string::npos) << change.from;
     write_bytes(b_ / "manifest.json",
                 std::string(manifest).replace(at, change.from.size(), change.to));
-    try {
-      open_recording(b_);
-      ADD_FAILURE() << change.to << " was taken";
-    } catch (const config::ConfigError& error) {
-      EXPECT_NE(std::string(error.what()).find("manifest.json: "), std::string::npos);
-      EXPECT_NE(std::string(error.what()).find(change.expected), std::string::npos) << error.what();
-    }
+    const auto error = sls::test::find_error<config::ConfigError>([&] { open_recording(b_); });
+    EXPECT_NE(error.find("manifest.json: "), std::string::npos) << error;
+    EXPECT_NE(error.find(change.expected), std::string::npos) << error;
   }
 }
 

@@ -74,10 +74,11 @@ TEST(KeysTest, MistakesAreOneLine) {
 /// Programs with a mistake in their keys: exit code 2, and one line.
 class BadKeysTest : public testing::Test {
  protected:
-  std::string start_server(const Words& before) {
-    return fail(
+  static void expect_refused(const Words& before, const std::string& cause) {
+    const std::string output = fail(
         before + make_command("sim_server", 0, {"--scenario", scenario("short")}, qos("secure")),
         2);
+    EXPECT_TRUE(holds(output, cause)) << output;
   }
   fs::path file(const std::string& name) const { return keys_.path() / "server" / name; }
 
@@ -85,17 +86,14 @@ class BadKeysTest : public testing::Test {
 };
 
 TEST_F(BadKeysTest, NoFolderAtAll) {
-  EXPECT_TRUE(holds(start_server({"env", "-u", "SLS_KEYS"}), "${SLS_KEYS}: expected"));
+  expect_refused({"env", "-u", "SLS_KEYS"}, "${SLS_KEYS}: expected");
 }
 
 TEST_F(BadKeysTest, AMissingFile) {
   for (const std::string& name : list(keys_.path() / "server")) {
     fs::rename(file(name), file("hidden"));
-    const std::string output = start_server(keys_.as());
-    EXPECT_NE(output.find(file(name).string() + ": expected a file that ./sls keys made, got no "
-                                                "such file"),
-              std::string::npos)
-        << output;
+    expect_refused(keys_.as(), file(name).string() +
+                                   ": expected a file that ./sls keys made, got no such file");
     fs::rename(file("hidden"), file(name));
   }
 }
@@ -104,8 +102,7 @@ TEST_F(BadKeysTest, AFileThatIsSomethingElse) {
   for (const std::string& name : list(keys_.path() / "server")) {
     const std::string content = read_bytes(file(name));
     write_bytes(file(name), "something else\n");
-    const std::string output = start_server(keys_.as());
-    EXPECT_NE(output.find(file(name).string() + ": expected "), std::string::npos) << output;
+    expect_refused(keys_.as(), file(name).string() + ": expected ");
     write_bytes(file(name), content);
   }
 }
@@ -116,9 +113,7 @@ TEST_F(BadKeysTest, AFileOfOtherKeys) {
                                   const std::string& message) {
     const std::string content = read_bytes(file(name));
     write_bytes(file(name), read_bytes(others.path() / "server" / name));
-    const std::string output = start_server(keys_.as());
-    EXPECT_NE(output.find(file(place).string() + ": expected " + message), std::string::npos)
-        << output;
+    expect_refused(keys_.as(), file(place).string() + ": expected " + message);
     write_bytes(file(name), content);
   };
   expect_message("key.pem", "key.pem", "the private key of");
@@ -133,16 +128,12 @@ TEST_F(BadKeysTest, AFileOfOtherKeys) {
 
 TEST_F(BadKeysTest, PermissionsOfSomebodyElse) {
   write_bytes(file("permissions.p7s"), read_bytes(keys_.path() / "operator/permissions.p7s"));
-  const std::string output = start_server(keys_.as());
-  EXPECT_NE(output.find("expected permissions for CN=server,OU=server,O=SLS, got none"),
-            std::string::npos)
-      << output;
+  expect_refused(keys_.as(), "expected permissions for CN=server,OU=server,O=SLS, got none");
 }
 
 TEST_F(BadKeysTest, ExpiredOnes) {
   keys_.add_expired("server", "old");
-  const std::string output = start_server(keys_.as("old"));
-  EXPECT_NE(output.find("got: certificate has expired"), std::string::npos) << output;
+  expect_refused(keys_.as("old"), "got: certificate has expired");
 }
 
 }  // namespace

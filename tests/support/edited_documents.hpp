@@ -1,16 +1,13 @@
 /// Documents made of a base and edits, one row of a table each, with the error message of each.
 ///
-///     # A comment.
-///     == NAME                        A base begins: its lines up to an empty line; then come its
-///     rows. vehicle.load_mass_kg: -0.16    Sets a YAML key or item that has lines of its own, or
-///     adds the
-///                                    key. Indented lines that follow belong to the value.
-///     - plant.rotors[1].axis         Removes a key.
-///     s/OLD/NEW/                     Replaces OLD, which is there once (empty: inserts NEW before
-///     the
-///                                    document). '/' may be '|'. \n, \t, \\ and \xHH are
-///                                    characters.
-///     ! 4: vehicle.load_mass_kg: …   The message ends the row.
+/// "# TEXT" is a comment. "== NAME" begins a base: its lines up to an empty line; then come its
+/// rows. A row has one or more edits and ends with "! MESSAGE", behind its last edit or on a line
+/// of its own. Edits:
+/// - "vehicle.load_mass_kg: -0.16" sets a YAML key or item that has lines of its own, or adds the
+///   key. Indented lines that follow belong to the value.
+/// - "- plant.rotors[1].axis" removes a key.
+/// - "s/OLD/NEW/" replaces OLD, which is there once (empty: inserts NEW before the document).
+///   '/' may be '|'. \n, \t, \\ and \xHH are characters.
 #pragma once
 
 #include <algorithm>
@@ -154,17 +151,18 @@ inline std::vector<EditedDocument> read_edited_documents(const std::string& tabl
       base.add(line);
     } else if (line[0] == ' ' && !edits.empty()) {
       edits.back() += '\n' + line;
-    } else if (line.rfind("! ", 0) == 0) {
+    } else if (line[0] != '#') {
+      const auto mark = line.rfind("! ", 0) == 0 ? 0 : line.find(" ! ");
+      if (mark != 0) edits.push_back(line.substr(0, mark));
+      if (mark == line.npos) continue;
       EditedLines lines = base;
       try {
         for (const std::string& edit : edits) lines.apply(edit);
       } catch (const std::exception& error) {
         throw std::runtime_error(place + ": " + error.what());
       }
-      documents.push_back({place, lines.text(), line.substr(2)});
+      documents.push_back({place, lines.text(), line.substr(line.find("! ", mark) + 2)});
       edits.clear();
-    } else if (line[0] != '#') {
-      edits.push_back(line);
     }
   }
   return documents;

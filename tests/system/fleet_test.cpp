@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cstdlib>
 #include <map>
-#include <regex>
 
 #include "common/config/scenario.hpp"
 #include "common/config/vehicle_ids.hpp"
@@ -178,29 +177,6 @@ INSTANTIATE_TEST_SUITE_P(FleetTest, GroupTest,
                                            Group{"lift_and_set_down", false},
                                            Group{"two_carry_a_bar", true}),
                          [](const auto& flown) { return std::string(flown.param.scenario); });
-
-TEST_F(FleetTest, VehiclesThatAreNotInTheScenarioAreRefused) {
-  const std::string file = make_fleet_scenario(folder);
-  const auto expect_refused = [](const Words& command, const std::string& cause) {
-    const std::string said = expect_exit(command, 2);
-    EXPECT_TRUE(std::regex_search(said, std::regex("^[a-z_]+: error: "))) << said;
-    EXPECT_TRUE(holds(said, cause)) << said;
-    EXPECT_EQ(std::count(said.begin(), said.end(), '\n'), 1) << said;
-  };
-  for (const char* name : {"sim_server", "control_client"}) {
-    const auto refuse = [&](const std::string& vehicles, const std::string& cause) {
-      expect_refused({program(name), "--scenario", file, "--vehicles", vehicles}, cause);
-    };
-    refuse("6", "--vehicles: expected vehicles from 0 to 5, got '6'");
-    refuse("0-9", "--vehicles: expected vehicles from 0 to 5, got '0-9'");
-    refuse("3-1", "--vehicles: expected all, or ids and ranges such as 0-9,20, got '3-1'");
-    refuse("one", "--vehicles: expected all, or ids and ranges such as 0-9,20, got 'one'");
-    expect_refused({program(name), "--scenario", scenario("short"), "--vehicles", "1"},
-                   "--vehicles: expected 0, the scenario's only vehicle, got '1'");
-  }
-  for (const char* threads : {"0", "-1", "two"})
-    expect_refused({program("sim_server"), "--scenario", file, "--threads", threads}, "--threads");
-}
 
 // --- resources -----------------------------------------------------------------------------------
 

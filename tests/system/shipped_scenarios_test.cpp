@@ -2,12 +2,9 @@
 /// single figures; tests/python/check/check_shipped_test.py flies these checks.
 #include <gtest/gtest.h>
 
-#include <complex>
 #include <optional>
 
 #include "common/model/reference.hpp"
-#include "sim_server/autopilots/px4/keys.hpp"
-#include "sim_server/plants/multirotor/keys.hpp"
 #include "tests/oracle/linear_theory.hpp"
 #include "tests/system/flight.hpp"
 
@@ -179,8 +176,6 @@ void expect_height_of_wrong_mass(const Flown& flown) {
     ASSERT_NEAR(flown.steps[i].error.z(), expected[i], 0.5 * flown.period() * 2.5e-4) << i;
 }
 
-// --- multirotors ---------------------------------------------------------------------------------
-
 /// The theory assumes continuous time; its error at 50 Hz is 1 %.
 void expect_hold_of_20_ms(const Flown& flown) {
   expect_designed_response(flown);
@@ -207,40 +202,6 @@ void expect_error_of_late_states(const Flown& flown) {
   }
 }
 
-/// Expects the error of small motions. `lag` is the transfer function of vehicle and autopilot from
-/// the commanded to the actual horizontal force.
-void expect_error_of_lag(const Flown& flown, const oracle::Transfer& lag, double tolerance) {
-  const Array3d rms = calc_second_lap_rms(flown);
-  const Array3d expected = oracle::calc_steady_error(flown.scenario, find_eight(flown), lag).rms();
-  for (int axis = 0; axis < 2; ++axis)
-    EXPECT_NEAR(rms[axis], expected[axis], tolerance * expected[axis]) << "axis " << axis;
-}
-
-/// With fast-changing set-points PX4's attitude loop responds like its outer gain alone: the rates
-/// follow immediately.
-void expect_lag_of_px4(const Flown& flown) {
-  const auto& keys = flown.scenario.autopilot->own.get<sim::px4::Keys>();
-  const double gain = keys.attitude.per_rad.x();
-  expect_error_of_lag(
-      flown, [&](const std::complex<double>& s) { return gain / (s + gain); }, 0.05);
-}
-
-/// The lag is k_R / (J s² (1 + τ s) + k_Ω s + k_R) with the default gains: 10 rad/s, no overshoot.
-void expect_lag_of_geometric(const Flown& flown) {
-  const auto& keys = flown.scenario.plant.own.get<sim::MultirotorKeys>();
-  constexpr double kRate = 10.0;
-  const double inertia = keys.inertia.x() / (keys.inertia.sum() / 3.0);
-  const double lag = 0.5 * (keys.rotor.lag_up + keys.rotor.lag_down);
-  ASSERT_EQ(keys.inertia.x(), keys.inertia.y());
-  expect_error_of_lag(
-      flown,
-      [&](const std::complex<double>& s) {
-        return kRate * kRate /
-               (inertia * s * s * (1.0 + lag * s) + 2.0 * kRate * s + kRate * kRate);
-      },
-      0.02);
-}
-
 const std::map<std::string, void (*)(const Flown&)> kJudges = {
     {"figure_eight", expect_eight},
     {"fleet", expect_designed_response},
@@ -252,9 +213,6 @@ const std::map<std::string, void (*)(const Flown&)> kJudges = {
     {"matlab_setpoint_2", expect_designed_response},
     {"matlab_setpoint_3", expect_designed_response},
     {"mission", expect_eight},
-    {"multirotor_figure_eight", expect_lag_of_px4},
-    {"multirotor_geometric", expect_lag_of_geometric},
-    {"px4_attitude", expect_lag_of_px4},
     {"px4_hold", expect_hold_of_20_ms},
     {"px4_ideal", expect_eight},
     {"px4_offset", expect_eight},

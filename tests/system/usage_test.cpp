@@ -20,107 +20,49 @@ void expect_refused(const Words& command, int exit_code, const std::string& caus
   EXPECT_TRUE(holds(said, cause)) << "expected '" << cause << "' in: " << said;
 }
 
-Words server_with(const Words& flags) { return Words{program("sim_server")} + flags; }
-
-TEST(UsageTest, EveryProgramPrintsHelpWithDefaultsAndItsVersion) {
-  for (const char* name : {"sim_server", "control_client", "recorder"}) {
-    const std::string help = expect_exit({program(name), "--help"});
-    for (const char* flag : {"--qos", "--domain", "--log-level", "--version", "info"})
-      EXPECT_TRUE(holds(help, flag)) << name << " " << flag << help;
-    EXPECT_TRUE(std::regex_match(expect_exit({program(name), "--version"}),
-                                 std::regex("sls \\d+\\.\\d+\\.\\d+\n")));
-  }
-}
-
-TEST(UsageTest, WrongFlagsAreRefused) {
-  expect_refused({program("sim_server")}, 2, "--scenario is required");
-  expect_refused({program("recorder")}, 2, "--out is required");
-  expect_refused(server_with({"--scenario", scenario("short"), "--nonsense"}), 2, "--nonsense");
-  for (const char* name : {"sim_server", "control_client"})
-    for (const char* domain : {"233", "-1", "one"})
-      expect_refused({program(name), "--scenario", scenario("short"), "--domain", domain}, 2,
-                     "--domain");
-  expect_refused(
-      {"/usr/bin/env", "SLS_DOMAIN=233", program("sim_server"), "--scenario", scenario("short")}, 2,
-      "SLS_DOMAIN: expected 0 to 232, got '233'");
-  expect_refused(server_with({"--scenario", scenario("short"), "--period-s", "0.0035"}), 2,
-                 "--period-s");
-  expect_refused(server_with({"--scenario", scenario("short"), "--period-s", "nan"}), 2,
-                 "--period-s");
-  expect_refused({program("control_client"), "--scenario", scenario("short"), "--name", "a,b"}, 2,
-                 "--name");
-  expect_refused(server_with({"--scenario", scenario("short"), "--mode", "fast"}), 2, "--mode");
-  expect_refused(server_with({"--scenario", scenario("short"), "--rtf", "2"}), 2,
-                 "--rtf: expected --mode realtime with it");
-  for (const char* factor : {"0", "-1", "nan", "inf", "1001"})
-    expect_refused(
-        server_with({"--scenario", scenario("short"), "--mode", "realtime", "--rtf", factor}), 2,
-        "--rtf");
-}
-
-TEST(UsageTest, OperatorAndVerifierRefuseImpossibleRequests) {
+/// One mistake of each kind in each program. CLI, readers and their messages: RunMainTest,
+/// InvalidScenariosTest, QosFileTest, VehicleIdsTest.
+TEST(UsageTest, MistakesAreRefused) {
   TemporaryFolder folder;
-  expect_refused({program("sim_ctl")}, 2, "");
-  expect_refused({program("sim_ctl"), "fly"}, 2,
-                 "expected pause, step, resume, start, reset, stop or status, got 'fly'");
-  expect_refused({program("sim_ctl"), "step", "0"}, 2, "0");
-  expect_refused({program("sls_verify")}, 2, "");
-  expect_refused({program("sls_verify"), folder / "none"}, 2, "none");
-  expect_refused({program("sls_verify"), folder.path()}, 2, "manifest.json");
-}
-
-TEST(UsageTest, UnusableScenariosAreRefusedByServerAndClient) {
-  TemporaryFolder folder;
-  write_bytes(folder / "empty.yaml", "");
-  fs::create_directory(folder / "folder.yaml");
+  const std::string flown = scenario("short");
   write_bytes(folder / "misspelt.yaml",
-              replace_once(read_file(scenario("short")), "load_mass_kg", "laod_mass_kg"));
-  write_bytes(folder / "negative.yaml", replace_once(read_file(scenario("short")),
-                                                     "load_mass_kg: 0.2", "load_mass_kg: -0.16"));
-  write_bytes(folder / "huge.yaml", "");
-  fs::resize_file(folder / "huge.yaml", 100'000'000);
+              replace_once(read_file(flown), "load_mass_kg", "laod_mass_kg"));
+  write_bytes(folder / "malformed.xml", read_file(qos("default")).substr(0, 500));
+  const auto refuse = [](const char* name, const Words& flags, const std::string& cause) {
+    expect_refused(Words{program(name)} + flags, 2, cause);
+  };
+  refuse("sim_server", {}, "--scenario is required");
+  refuse("recorder", {}, "--out is required");
+  refuse("recorder", {"--out", folder / "recording", "--qos", folder / "malformed.xml"},
+         "malformed.xml:");
   for (const char* name : {"sim_server", "control_client"}) {
-    const auto refuse = [&](const std::string& file, const std::string& cause) {
-      expect_refused({program(name), "--scenario", file}, 2, cause);
+    const auto refuse_flags = [&](const Words& flags, const std::string& cause) {
+      refuse(name, Words{"--scenario", flown} + flags, cause);
     };
-    refuse(folder / "none.yaml", "none.yaml: ");
-    refuse(folder / "empty.yaml", "empty.yaml: ");
-    refuse(folder / "folder.yaml", "folder.yaml: ");
-    refuse(folder / "huge.yaml", "100000000");
-    refuse(folder / "misspelt.yaml", "misspelt.yaml:3: vehicle.laod_mass_kg: unknown key");
-    refuse(folder / "negative.yaml",
-           "negative.yaml:3: vehicle.load_mass_kg: expected > 0, got -0.16");
+    refuse(name, {"--scenario", folder / "misspelt.yaml"},
+           "misspelt.yaml:3: vehicle.laod_mass_kg: unknown key");
+    refuse_flags({"--qos", folder / "malformed.xml"}, "malformed.xml:");
+    refuse_flags({"--domain", "233"}, "--domain");
+    refuse_flags({"--vehicles", "1"},
+                 "--vehicles: expected 0, the scenario's only vehicle, got '1'");
   }
-}
-
-TEST(UsageTest, UnusableQosFilesAreRefusedByEveryProgram) {
-  TemporaryFolder folder;
-  const std::string shipped = read_file(qos("default"));
-  write_bytes(folder / "malformed.xml", shipped.substr(0, shipped.size() / 2));
-  const std::string endpoints = read_file(qos("endpoints"));
-  const std::string whole = replace_once(
-      shipped, "</profiles>",
-      endpoints.substr(endpoints.find("<data_writer"),
-                       endpoints.rfind("</profiles>") - endpoints.find("<data_writer")) +
-          "</profiles>");
-  write_bytes(folder / "misnamed.xml", replace_once(whole, "\"sls_loop_reader\"", "\"sls_lop\""));
-  write_bytes(folder / "refused.xml",
-              replace_once(whole, "<depth>150</depth>", "<depth>many</depth>"));
-  int run_number = 0;
-  for (const char* name : {"sim_server", "control_client", "recorder"}) {
-    const auto refuse = [&](const std::string& file, const std::string& cause) {
-      const bool records = std::string(name) == "recorder";
-      const std::string out = folder / ("recording" + std::to_string(run_number++));
-      expect_refused(Words{program(name), "--qos", file} +
-                         (records ? Words{"--out", out} : Words{"--scenario", scenario("short")}),
-                     2, cause);
-    };
-    refuse(folder / "none.xml", "none.xml: ");
-    refuse(folder.path(), "got a directory");
-    refuse(folder / "malformed.xml", "malformed.xml:");
-    refuse(folder / "misnamed.xml", "profile 'sls_lop'");
-    refuse(folder / "refused.xml", "refused.xml: ");
-  }
+  refuse("control_client", {"--scenario", flown, "--name", "a,b"}, "--name");
+  const auto refuse_flags = [&](const Words& flags, const std::string& cause) {
+    refuse("sim_server", Words{"--scenario", flown} + flags, cause);
+  };
+  refuse_flags({"--period-s", "0.0035"}, "--period-s");
+  refuse_flags({"--mode", "fast"}, "--mode");
+  refuse_flags({"--rtf", "2"}, "--rtf: expected --mode realtime with it");
+  for (const char* factor : {"0", "-1", "nan", "inf", "1001"})
+    refuse_flags({"--mode", "realtime", "--rtf", factor}, "--rtf");
+  for (const char* threads : {"0", "-1", "two"}) refuse_flags({"--threads", threads}, "--threads");
+  refuse("sim_ctl", {}, "");
+  refuse("sim_ctl", {"fly"},
+         "expected pause, step, resume, start, reset, stop or status, got 'fly'");
+  refuse("sim_ctl", {"step", "0"}, "0");
+  refuse("sls_verify", {}, "");
+  refuse("sls_verify", {folder / "none"}, "none");
+  refuse("sls_verify", {folder.path()}, "manifest.json");
 }
 
 TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithForce) {
@@ -146,7 +88,7 @@ TEST(UsageTest, TooLittleSharedMemoryIsNamedBeforeTheFirstSample) {
   const TemporaryFolder folder;
   const Words limited = {"/usr/bin/unshare", "--mount", "sh", "-c",
                          "mount -t tmpfs -o size=1m tmpfs /dev/shm && exec \"$0\" \"$@\""};
-  for (const Words& command : {server_with({"--scenario", scenario("short")}),
+  for (const Words& command : {Words{program("sim_server"), "--scenario", scenario("short")},
                                {program("control_client"), "--scenario", scenario("short")},
                                {program("recorder"), "--out", folder / "recording"}})
     expect_refused(limited + command, 1,

@@ -1,5 +1,5 @@
 # Completion of ./sls and sls in bash. To use it: source tools/completion/sls.bash
-# The launcher answers: python/sls/launcher/completion.py. tests/docs/completion_test.py completes with it.
+# The launcher answers: python/sls/launcher/completion.py. tests/launcher/completion_test.py completes with it.
 # shellcheck shell=bash
 
 _sls() {

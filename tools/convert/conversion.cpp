@@ -5,13 +5,12 @@
 
 #include <cerrno>
 #include <cmath>
-#include <fstream>
 #include <limits>
 #include <set>
-#include <sstream>
 #include <system_error>
 
 #include "common/config/config_error.hpp"
+#include "common/config/scenario_reader.hpp"
 #include "recorder/sinks/mcap/mcap_sink.hpp"
 
 namespace sls::convert {
@@ -20,15 +19,6 @@ namespace {
 namespace fs = std::filesystem;
 using config::ConfigError;
 using record::StepRows;
-
-std::string read_text(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  text << stream.rdbuf();
-  if (!stream)
-    throw ConfigError(file.string() + ": expected the recording's scenario, cannot read it");
-  return text.str();
-}
 
 /// Those parameters of the recorder on which the content of the MCAP file depends.
 Parameters load_parameters(const record::OpenedRecording& flight) {
@@ -41,7 +31,8 @@ Parameters load_parameters(const record::OpenedRecording& flight) {
   Parameters parameters;
   parameters.scenario_sha256(manifest.scenario_sha256);
   parameters.contract_sha256(manifest.contract_sha256);
-  parameters.scenario_text(read_text(flight.folder / "scenario.yaml"));
+  parameters.scenario_text(
+      config::read_config_file(flight.folder / "scenario.yaml", "the recording's scenario"));
   parameters.period_ns(std::llround(manifest.period_s * 1e9));
   const std::set<std::uint32_t> ids(manifest.vehicle_ids.begin(), manifest.vehicle_ids.end());
   for (const std::uint32_t id : ids) parameters.vehicles().emplace_back().vehicle_id(id);

@@ -56,7 +56,7 @@ std::optional<sync::Run> OperatorClient::wait_for_run() const {
 std::optional<sync::Run> OperatorClient::wait_for_any_run() const {
   return wait_for([this] {
     const auto run = servers_.find_joinable(options_.vehicle_id);
-    return run ? run : find_ended_run();
+    return run ? run : find_any_run(servers_, options_.vehicle_id);
   });
 }
 
@@ -72,12 +72,6 @@ std::optional<sync::Run> OperatorClient::wait_for(const FindRun& find) const {
                    options_.vehicle_id, options_.domain, wait.seconds_left());
     std::this_thread::sleep_for(app::kPollTime);
   }
-  return std::nullopt;
-}
-
-std::optional<sync::Run> OperatorClient::find_ended_run() const {
-  for (const sync::Run& run : servers_.runs())
-    if (run.status && sync::serves_vehicle(run.parameters, options_.vehicle_id)) return run;
   return std::nullopt;
 }
 
@@ -230,6 +224,13 @@ void OperatorClient::report_wait(const sync::Run& run, const SimControl& request
   const std::uint64_t now = status ? std::max(status->step(), begin) : begin;
   spdlog::info("waiting for: {} steps ({} done, at step {})", request.steps(),
                std::min(now - begin, request.steps()), now);
+}
+
+std::optional<sync::Run> find_any_run(const bus::ServerDirectory& servers,
+                                      std::uint32_t vehicle_id) {
+  for (const sync::Run& run : servers.runs())
+    if (run.status && sync::serves_vehicle(run.parameters, vehicle_id)) return run;
+  return std::nullopt;
 }
 
 std::string make_operator_name() {

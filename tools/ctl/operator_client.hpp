@@ -87,7 +87,6 @@ class OperatorClient {
   using FindRun = std::function<std::optional<sync::Run>()>;
 
   std::optional<sync::Run> wait_for(const FindRun& find) const;
-  std::optional<sync::Run> find_ended_run() const;
   void note_event(const SimStatus& status);
   Events& find_or_add_events(std::uint64_t run_id);
   bool keep_next_reply(std::chrono::steady_clock::time_point deadline);
@@ -105,6 +104,10 @@ class OperatorClient {
   std::deque<Received> kept_;  // taken from `replies_`, also those to other requests
   std::optional<Channel> channel_;
 };
+
+/// A run of the vehicle that has a status, also one that has ended.
+std::optional<sync::Run> find_any_run(const bus::ServerDirectory& servers,
+                                      std::uint32_t vehicle_id);
 
 /// USER@HOST, at most 64 bytes, for sls/control.
 std::string make_operator_name();

@@ -76,7 +76,7 @@ bool is_complete(const Observations& seen, bool is_echo_expected, Clock::duratio
          std::all_of(seen.heard.begin(), seen.heard.end(), [&](const Heard& heard) {
            return heard.domain != seen.domain || !is_flying(heard.announcement.name) ||
                   heard.announcement.is_secured != seen.settings.is_secured ||
-                  is_met(heard.announcement.id);
+                  is_met(heard.announcement.sender);
          });
 }
 

@@ -1,4 +1,4 @@
-#include "tools/doctor/endpoint_qos.hpp"
+#include "tools/doctor/file_qos.hpp"
 
 #include <slsPubSubTypes.h>
 
@@ -24,67 +24,43 @@ void fill(Endpoint& endpoint, const Qos& qos, const GroupQos& group) {
   endpoint.partitions = group.partition().names();
 }
 
-/// Makes the endpoints of one topic after another.
-class Maker {
- public:
-  Maker(dds::Publisher& publisher, dds::Subscriber& subscriber, const std::string& file)
-      : publisher_(publisher), subscriber_(subscriber), file_(file) {}
-
-  template <class Message, class PubSubType>
-  void add() {
-    PubSubType type;
-    Endpoint endpoint;
-    endpoint.topic = bus::Topic<Message>::kName;
-    endpoint.type = bus::name_of(type);
-    endpoint.max_size = bus::max_size_of(type);
-    const bus::Flow flow = bus::Topic<Message>::kFlow;
-    add_writer(endpoint, bus::find_writer_profile(flow));
-    add_reader(endpoint, flow == bus::Flow::kLoop     ? bus::kLoopReaderProfile
-                         : flow == bus::Flow::kRecord ? bus::kRecordReaderProfile
-                                                      : bus::kLatchedReaderProfile);
-  }
-
-  std::vector<Endpoint> made;
-
- private:
-  void add_writer(Endpoint endpoint, const char* profile) {
-    dds::DataWriterQos qos;
-    publisher_.get_datawriter_qos_from_profile(profile, qos);
-    endpoint.is_writer = true;
-    endpoint.owner = std::string(profile) + " of " + file_;
-    endpoint.participant.bytes[0] = 1;  // differs from the readers' participant
-    fill(endpoint, qos, publisher_.get_qos());
-    made.push_back(std::move(endpoint));
-  }
-
-  void add_reader(Endpoint endpoint, const char* profile) {
-    dds::DataReaderQos qos;
-    subscriber_.get_datareader_qos_from_profile(profile, qos);
-    endpoint.owner = std::string(profile) + " of " + file_;
-    endpoint.max_size = 0;
-    fill(endpoint, qos, subscriber_.get_qos());
-    made.push_back(std::move(endpoint));
-  }
-
-  dds::Publisher& publisher_;
-  dds::Subscriber& subscriber_;
-  const std::string file_;
-};
-
 }  // namespace
 
 std::vector<Endpoint> make_own_endpoints(dds::Publisher& publisher, dds::Subscriber& subscriber,
                                          const std::string& file) {
-  Maker maker(publisher, subscriber, file);
-  maker.add<States, StatesPubSubType>();
-  maker.add<Commands, CommandsPubSubType>();
-  maker.add<RecordBatch, RecordBatchPubSubType>();
-  maker.add<Participant, ParticipantPubSubType>();
-  maker.add<Parameters, ParametersPubSubType>();
-  maker.add<SimStatus, SimStatusPubSubType>();
-  maker.add<SimControl, SimControlPubSubType>();
-  maker.add<SimControlReply, SimControlReplyPubSubType>();
-  return maker.made;
+  std::vector<Endpoint> made;
+  const auto add = [&](auto traits, auto&& type) {
+    using Topic = decltype(traits);
+    Endpoint writer;
+    writer.topic = Topic::kName;
+    writer.type = bus::name_of(type);
+    Endpoint reader = writer;
+    const char* profile = bus::find_writer_profile(Topic::kFlow);
+    dds::DataWriterQos writer_qos;
+    publisher.get_datawriter_qos_from_profile(profile, writer_qos);
+    writer.is_writer = true;
+    writer.max_size = bus::max_size_of(type);
+    writer.owner = std::string(profile) + " of " + file;
+    writer.participant.bytes[0] = 1;  // differs from the readers' participant
+    fill(writer, writer_qos, publisher.get_qos());
+    profile = Topic::kFlow == bus::Flow::kLoop     ? bus::kLoopReaderProfile
+              : Topic::kFlow == bus::Flow::kRecord ? bus::kRecordReaderProfile
+                                                   : bus::kLatchedReaderProfile;
+    dds::DataReaderQos reader_qos;
+    subscriber.get_datareader_qos_from_profile(profile, reader_qos);
+    reader.owner = std::string(profile) + " of " + file;
+    fill(reader, reader_qos, subscriber.get_qos());
+    made.insert(made.end(), {writer, reader});
+  };
+  add(bus::Topic<States>(), StatesPubSubType());
+  add(bus::Topic<Commands>(), CommandsPubSubType());
+  add(bus::Topic<RecordBatch>(), RecordBatchPubSubType());
+  add(bus::Topic<Participant>(), ParticipantPubSubType());
+  add(bus::Topic<Parameters>(), ParametersPubSubType());
+  add(bus::Topic<SimStatus>(), SimStatusPubSubType());
+  add(bus::Topic<SimControl>(), SimControlPubSubType());
+  add(bus::Topic<SimControlReply>(), SimControlReplyPubSubType());
+  return made;
 }
 
 }  // namespace sls::doctor

@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "tools/doctor/announcement.hpp"
+#include "common/bus/fastdds/plain_announcements.hpp"
 #include "tools/doctor/probe.hpp"
 #include "tools/doctor/udp_socket.hpp"
 
@@ -15,7 +15,7 @@ namespace sls::doctor {
 struct Heard {
   int domain = 0;
   std::string address;  ///< sender
-  Announcement announcement;
+  bus::PlainAnnouncement announcement;
 };
 
 class ListeningPost {

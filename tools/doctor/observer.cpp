@@ -28,8 +28,7 @@
 #include "common/config/config_error.hpp"
 #include "fastdds_announcements.hpp"
 #include "fastdds_api.hpp"
-#include "tools/doctor/endpoint_qos.hpp"
-#include "tools/doctor/participant_qos.hpp"
+#include "tools/doctor/file_qos.hpp"
 #include "tools/doctor/probe.hpp"
 #include "tools/doctor/udp_socket.hpp"
 

@@ -7,7 +7,7 @@
 #include "common/bus/node.hpp"
 #include "common/bus/topics.hpp"
 #include "fastdds_api.hpp"
-#include "tools/doctor/participant_qos.hpp"
+#include "tools/doctor/file_qos.hpp"
 
 namespace sls::doctor {
 namespace {

@@ -1,4 +1,4 @@
-"""Reads the text that --help prints: that of CLI11, of argparse, and of the launcher."""
+"""Reads the text that --help of a program prints, as CLI11 formats it."""
 
 import dataclasses
 import re
@@ -16,10 +16,6 @@ class Item:
     notes: list = dataclasses.field(default_factory=list)  # "required", "excludes --force"
     text: str = ""
 
-    @property
-    def is_option(self):
-        return self.names[0].startswith("-")
-
     def spell(self):
         """The item as a user types it: "-h, --help", "--qos FILE"."""
         return ", ".join(self.names) + (f" {self.argument}" if self.argument else "")
@@ -28,31 +24,14 @@ class Item:
 @dataclasses.dataclass
 class Help:
     description: str
-    usage: list  # without the word "usage:"
+    usage: str
     positionals: list
     options: list
     subcommands: list
 
-
-def _split_lines(text):
-    """(spec, meaning) of every indented entry, with the lines that continue it joined."""
-    entries, indent = [], 0
-    for line in text.splitlines():
-        body = line.strip()
-        here = len(line) - len(line.lstrip())
-        if not body:
-            indent = 0
-            continue
-        if here == 0:
-            continue
-        is_entry = re.match(r"-{1,2}\w", body) or not indent or here <= indent
-        if entries and indent and here > indent and not is_entry:
-            entries[-1][1] = (entries[-1][1] + " " + body).strip()
-            continue
-        spec, _, meaning = re.sub(r"\s{2,}", "\t", body, count=1).partition("\t")
-        entries.append([spec, meaning])
-        indent = here
-    return entries
+    def list_own(self):
+        """Arguments and options but those of every program."""
+        return self.positionals + [option for option in self.options if option.names[-1] not in ("--help", "--version")]
 
 
 def parse_item(spec, text):
@@ -95,34 +74,13 @@ def parse_item(spec, text):
 
 def parse(text):
     """The parts of one help text."""
-    usage, sections, heads = [], {}, []
-    section, is_usage = None, False
-    for line in text.splitlines():
-        match = re.match(r"[Uu]sage: (.*)", line)
-        if match:
-            usage.append(match[1].strip().replace("(0x)", "..."))
-            is_usage, section = True, None
-            continue
-        if is_usage and line.startswith(" ") and line.strip():
-            if re.match(r" {2,}-", line) and not line.strip().startswith("["):
-                is_usage = False
-            elif line.strip().startswith("./sls"):
-                usage.append(line.strip())
-                continue
-            else:
-                usage[-1] += " " + line.strip()
-                continue
-        is_usage = False
-        match = re.match(r"(Options|options|Positionals|positional arguments|Subcommands):$", line)
-        if match:
-            section = match[1].lower().split()[0].rstrip("s")
-        if match or section is None and not line.startswith(" "):
-            if not match:
-                heads.append(line)
-            continue
-        sections.setdefault(section or "option", []).append(line)
-    parts = {name: [parse_item(*entry) for entry in _split_lines("\n".join(lines))]
-             for name, lines in sections.items()}
-    return Help("\n".join(heads).strip(), usage, parts.get("positional", []),
-                [item for item in parts.get("option", []) if item.is_option],
-                parts.get("subcommand", []))
+    description, _, rest = text.partition("Usage: ")
+    usage, _, rest = rest.partition("\n")
+    parts = {"Positionals": [], "Options": [], "Subcommands": []}
+    for title, lines in re.findall(r"^(\w+):\n((?: .*\n)+)", rest, re.MULTILINE):
+        for entry in re.split(r"\n(?=  \S)", lines):
+            first, *more = map(str.strip, entry.strip().splitlines())
+            spec, _, meaning = re.sub(r"\s{2,}", "\t", first, count=1).partition("\t")
+            parts.setdefault(title.capitalize(), []).append(parse_item(spec, " ".join([meaning, *more]).strip()))
+    return Help(description.strip(), usage.strip().replace("(0x)", "..."), parts["Positionals"],
+                parts["Options"], parts["Subcommands"])

@@ -26,10 +26,8 @@ def make_start(name, version, summary, synopsis):
     summary = summary.rstrip(".")
     # The line has no other plain "-" and no line break, so that apropos finds all of it.
     text += f"{escape(name)} \\- {escape(summary[0].lower() + summary[1:])}\n.SH SYNOPSIS\n"
-    for index, line in enumerate(synopsis):
-        command, _, rest = line.partition(" ")
-        text += (".br\n" if index else "") + f".B {escape(command)}\n" + (escape(rest) + "\n" if rest else "")
-    return text
+    command, _, rest = synopsis.partition(" ")
+    return text + f".B {escape(command)}\n" + (escape(rest) + "\n" if rest else "")
 
 
 def make_items(items):
@@ -63,8 +61,7 @@ def make_program(name, parsed, subcommands, version, names):
         if items:
             text += f".SH {title}\n" + make_items(items)
     for subcommand, its_help in subcommands.items():
-        own = its_help.positionals + [option for option in its_help.options if "--help" not in option.names]
-        if own:
+        if own := its_help.list_own():
             text += f'.SH "OPTIONS OF {subcommand.upper()}"\n' + make_items(own)
     return text + make_end(name, names)
 
@@ -75,17 +72,18 @@ def make_launcher(page, version, names):
     usage = next((line.partition(":")[2].strip() for line in overview.splitlines()
                   if line.lower().startswith("usage:")), "./sls COMMAND [OPTIONS]")
     text = make_start("sls", version, "sets up, builds, flies and tests the slung-load simulator",
-                      [usage.removeprefix("./")])
+                      usage.removeprefix("./"))
     text += ".SH DESCRIPTION\n.nf\n" + escape(re.sub(r"\n\n+", "\n.sp\n", overview)).replace("\\&.sp", ".sp")
     text += "\n.fi\n.SH COMMANDS\n"
-    for command in sources.list_commands():
+    for command in sources.COMMANDS:
         block = pages.find_block(page, command)
-        link = re.search(rf"^### \./sls {command}\n\nIt starts `(\w+)`", page, re.MULTILINE)
         if block:
             text += f".SS {escape(command)}\n.nf\n"
             text += escape(re.sub(r"\n\n+", "\n.sp\n", block)).replace("\\&.sp", ".sp") + "\n.fi\n"
-        elif link:
-            text += f".SS {escape(command)}\nStarts\n.BR {escape(link[1])} (1)\nwith the same options.\n"
+        elif row := pages.find_row(page, command):
+            program = re.match(r"\[(\w+)\]", row)
+            meaning = f"Starts\n.BR {escape(program[1])} (1)\nwith the same options." if program else escape(row)
+            text += f".SS {escape(command)}\n{meaning}\n"
     return text + make_end("sls", names)
 
 

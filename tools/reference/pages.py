@@ -8,13 +8,9 @@ NOTE = ("<!-- Generated from the code's own tables by ./sls reference; changes h
         "tests/docs/reference_test.py compares. -->\n")
 
 
-def escape(text):
-    return text.replace("|", "\\|")
-
-
 def make_table(head, rows):
     lines = ["| " + " | ".join(head) + " |", "|" + " --- |" * len(head)]
-    lines += ["| " + " | ".join(escape(cell) for cell in row) + " |" for row in rows]
+    lines += ["| " + " | ".join(cell.replace("|", "\\|") for cell in row) + " |" for row in rows]
     return "\n".join(lines) + "\n"
 
 
@@ -60,6 +56,14 @@ def to_condition(key):
     return f"With `{name}`: " + (", ".join(values[:-1]) + " or " if values[1:] else "") + values[-1]
 
 
+def merge_alike(rows):
+    """Rows of keys with one name, such as those that all faults have, as one row."""
+    merged = {}
+    for path, *cells in rows:
+        merged.setdefault((path.rpartition(".")[2], *cells), []).append(path)
+    return [[", ".join(f"`{path}`" for path in paths), *cells] for (_, *cells), paths in merged.items()]
+
+
 def make_scenario_page(build):
     text = "# Scenario keys\n\n" + NOTE + """
 Every key of a scenario file. [common/config](../../common/config/README.md) describes how the file is read, and fleets.
@@ -72,18 +76,20 @@ Every key of a scenario file. [common/config](../../common/config/README.md) des
 """
     sections = {}
     for key in sources.load_keys(build):
+        if key["default_words"] == "as in `plant.rotor`":
+            continue  # the meaning of `plant.rotors` says it for all
         section = sections.setdefault(re.split(r"[.\[]", key["path"])[0], {})
         # Keys of a model have a table of their own; the meaning of other conditional keys ends with their condition.
         condition = to_condition(key) if key["condition"] else ""
         own_table = condition if key["condition"].startswith(("model", "law")) else ""
         meaning = key["meaning"] + (f" {condition}." if condition and not own_table else "")
         section.setdefault(own_table, []).append(
-            [f"`{key['path']}`", to_type(key), key["unit"], to_range(key), to_default(key), meaning])
+            [key["path"], to_type(key), key["unit"], to_range(key), to_default(key), meaning])
     for name, tables in sections.items():
         text += f"\n## {name}\n"
         for condition, rows in tables.items():
             text += f"\n### {condition}\n" if condition else ""
-            text += "\n" + make_table(["key", "type", "unit", "range", "default", "meaning"], rows)
+            text += "\n" + make_table(["key", "type", "unit", "range", "default", "meaning"], merge_alike(rows))
     return text
 
 
@@ -111,48 +117,60 @@ def to_rows(items):
 
 
 def describe_help(name, parsed, level):
-    text = f"\n{'#' * level} {name}\n\n{parsed.description}\n\n"
-    text += "".join(f"    {usage}\n" for usage in parsed.usage)
-    items = parsed.positionals + parsed.options
-    if items:
+    text = f"\n{'#' * level} {name}\n\n{parsed.description}\n\n    {parsed.usage}\n"
+    if items := parsed.list_own():
         text += "\n" + make_table(["argument", "values", "default", "meaning"], to_rows(items))
     return text
 
 
 def make_commands_page(build):
     text = "# Commands and options\n\n" + NOTE + """
-First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints.
-[Exit codes](error-codes.md) are the same for all programs.
+First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints. Every command has
+`--help`, every program `--help` and `--version`. [Exit codes](error-codes.md) are the same for all programs.
 
 ## ./sls
 """
     launcher = sources.read_launcher(build)
     programs = sources.load_programs(build)
     helps = {sources.read_help(build, name).rstrip(): name for name in programs}
-    text += "\n" + to_block(launcher[""])
+    text += "\n" + to_block(launcher.pop("")) + "\nThese commands start a program with the same options:\n\n"
+    text += make_table(["command", "program"], [[f"`./sls {command}`", f"[{helps[block]}](#{helps[block]})"]
+                                                for command, block in launcher.items() if block in helps])
+    plain = {command: found[1].replace("\n", " ") for command, block in launcher.items()
+             if (found := re.fullmatch(rf"usage: \./sls {command}\n\n((?:.+\n?)+)", block))}
+    text += "\nThese have no options:\n\n" + make_table(["command", "meaning"], [
+        [f"`./sls {command}`", meaning] for command, meaning in plain.items()])
     for command, block in launcher.items():
-        if not command:
-            continue
-        text += f"\n### ./sls {command}\n\n"
-        if block in helps:
-            text += f"It starts `{helps[block]}` with the same options: [{helps[block]}](#{helps[block]}).\n"
-        else:
-            text += to_block(block)
+        if block not in helps and command not in plain:
+            text += f"\n### ./sls {command}\n\n" + to_block(block)
     for name, (parsed, subcommands) in programs.items():
         text += describe_help(name, parsed, 2)
+        if subcommands:
+            text += "\n" + make_table(["subcommand", "meaning"], [
+                [f"`{its_help.usage.replace(' [OPTIONS]', '')}`", "; ".join([its_help.description] + [
+                    f"{item.names[0]}: {item.text}" for item in its_help.positionals])]
+                for its_help in subcommands.values()])
         for subcommand, its_help in subcommands.items():
-            text += describe_help(f"{name} {subcommand}", its_help, 3)
+            if any(item.names[0].startswith("-") for item in its_help.list_own()):
+                text += describe_help(f"{name} {subcommand}", its_help, 3)
     return text
 
 
 def to_block(text):
-    return "```text\n" + text.rstrip() + "\n```\n"
+    """The text without its line of --help."""
+    return "```text\n" + re.sub(r"^  -h, ?--help .*\n", "", text, flags=re.MULTILINE).rstrip() + "\n```\n"
 
 
 def find_block(page, command):
     """The text of a command in docs/reference/commands.md; for "" the text of ./sls help."""
     heading = re.escape(f"### ./sls {command}" if command else "## ./sls")
     match = re.search(rf"^{heading}\n\n```text\n(.*?)\n```$", page, re.MULTILINE | re.DOTALL)
+    return match[1] if match else ""
+
+
+def find_row(page, command):
+    """What the tables say of a command without a block: a link to the program that it starts, or its meaning."""
+    match = re.search(rf"^\| `\./sls {re.escape(command)}` \| (.*) \|$", page, re.MULTILINE)
     return match[1] if match else ""
 
 
@@ -184,14 +202,15 @@ Topics, their types and their QoS, from `common/bus/topics.hpp`, `idl/sls.idl` a
     text += "\n## Enumerations\n"
     for name, values in enums.items():
         text += f"\n### {name}\n\n" + (comments[name] + "\n\n" if comments[name] else "")
-        text += make_table(["number", "value", "meaning"],
-                           [[str(number), f"`{value}`", comment] for number, (value, comment) in enumerate(values)])
+        if any(comment for _, comment in values):
+            text += make_table(["number", "value", "meaning"],
+                               [[str(number), f"`{value}`", comment] for number, (value, comment) in enumerate(values)])
+        else:
+            text += ", ".join(f"{number} `{value}`" for number, (value, _) in enumerate(values)) + "\n"
     return text
 
 
 def make_error_codes_page(_):
-    enums = sources.load_contract()[1]
-    structs = sources.load_contract()[0]
     text = "# Error codes\n\n" + NOTE + """
 ## Exit codes of every program and of ./sls
 
@@ -210,24 +229,15 @@ failed. Logs and recordings show the name.
     text += """
 ## Counters of a run
 
-The server counts these events in `counters` of `sls/status`; `status.csv` has a column for each.
+The server counts the events of [SyncCounters](topics.md#synccounters) in `counters` of `sls/status`; `status.csv` has a
+column for each.
 
-"""
-    text += make_table(["counter", "meaning"],
-                       [[f"`{field}`", comment] for _, field, comment in structs["SyncCounters"]])
-    text += """
 `stale` counts answers that reached the server. Fast DDS drops an expired answer earlier and without a count: then only
 `late` and `held` grow, as without a client. Its cause is the network, or a clock that is behind the server's.
 
 `rejected_not_finite` counts NaN and infinity in the force, the controller's numbers or the reference. A client that
 cannot compute an answer sends the error code `not_finite` instead.
-
-## Kinds of an entry in sls/record
-
 """
-    text += make_table(["number", "value", "meaning"],
-                       [[str(number), f"`{value}`", comment]
-                        for number, (value, comment) in enumerate(enums["AnswerKind"])])
     return text
 
 

@@ -70,11 +70,6 @@ def read_version(build):
 # --- the launcher ---------------------------------------------------------------------------------
 
 
-def list_commands():
-    """The commands of ./sls."""
-    return list(COMMANDS)
-
-
 def read_launcher(build):
     """{"": the text of ./sls help, command: that of ./sls COMMAND --help}."""
     environment = dict(os.environ, SLS_BUILD=str(build), COLUMNS="100", LC_ALL="C.UTF-8")
@@ -85,7 +80,7 @@ def read_launcher(build):
         text = re.sub(r"=\S*/config/qos/", "=config/qos/", text)
         return re.sub(r"([Uu]sage: )(?!\./sls\b)\S*/", r"\1", text).rstrip()
 
-    return {"": ask("help")} | {name: ask(name, "--help") for name in list_commands() if name != "help"}
+    return {"": ask("help")} | {name: ask(name, "--help") for name in COMMANDS if name != "help"}
 
 
 # --- scenario -------------------------------------------------------------------------------------
@@ -153,12 +148,13 @@ def load_keys(build):
 
 def load_topics():
     """[(name, type, flow)], as common/bus/topics.hpp has them."""
-    found = re.findall(r"struct Topic<(\w+)> \{\s*static constexpr TopicId kId = TopicId::k\w+;\s*"
-                       r'static constexpr const char\* kName = "([^"]+)";\s*'
-                       r"static constexpr Flow kFlow = Flow::k(\w+);", read("common/bus/topics.hpp"))
-    if not found:
-        raise SystemExit("common/bus/topics.hpp: expected topics, got none")
-    return [(name, message, flow) for message, name, flow in found]
+    text = read("common/bus/topics.hpp")
+    names = re.findall(r'"(sls/\w+)"', text)
+    found = re.findall(r"struct Topic<(\w+)> : TopicOf<TopicId::k\w+, Flow::k(\w+)>", text)
+    if not found or len(found) != len(names):
+        raise SystemExit("common/bus/topics.hpp: expected topics and as many names, got "
+                         f"{len(found)} and {len(names)}")
+    return [(name, message, flow) for name, (message, flow) in zip(names, found)]
 
 
 def load_profiles():
@@ -198,41 +194,20 @@ def load_endpoints():
 def load_contract():
     """The structs and enumerations of idl/sls.idl: ({name: [(type, name, comment)]}, {name: [(value, comment)]},
     {name: comment before it})."""
-    structs, enums, comments, before = {}, {}, {}, []
-    body = None
-    enum = None
-    for line in read("idl/sls.idl").splitlines():
-        code, _, comment = line.partition("//")
-        code, comment = code.strip(), comment.strip()
-        if enum is not None or code.startswith("enum "):
-            if code.startswith("enum "):
-                enum = re.match(r"enum (\w+)", code)[1]
-                comments[enum], enums[enum], before = " ".join(before), [], []
-                code = code.partition("{")[2]
-            values = re.findall(r"[A-Z]\w+", code)
-            enums[enum] += [(value, "") for value in values]
-            if comment and enums[enum]:
-                value, so_far = enums[enum][-1]
-                enums[enum][-1] = (value, f"{so_far} {comment}".strip())
-            if "}" in code:
-                enum = None
-        elif code.startswith("struct "):
-            body = re.match(r"struct (\w+)", code)[1]
-            comments[body], structs[body], before = " ".join(before), [], []
-        elif body and (match := re.match(r"(.+?)\s+(\w+(?:\[\d+\])?);$", code)):
-            name, _, size = match[2].partition("[")
-            structs[body].append((match[1] + ("[" + size if size else ""), name, comment))
-        elif body and not code and comment:
-            kind, name, so_far = structs[body][-1]
-            structs[body][-1] = (kind, name, f"{so_far} {comment}".strip())
-        elif code.startswith("}"):
-            body, before = None, []
-        elif code == "@final":
-            pass
-        elif not code and comment:
-            before.append(comment)
-        else:
-            before = []
+    structs, enums, comments = {}, {}, {}
+    for before, kind, name, body in re.findall(r"((?:^ *//.*\n)*)(?:^ *@final\n)?^ *(struct|enum) (\w+) *\{([^}]*)\}",
+                                               read("idl/sls.idl"), re.MULTILINE):
+        comments[name] = " ".join(line.strip().removeprefix("//").strip() for line in before.splitlines())
+        entries = []  # each with its comment, which may go on in the lines after it
+        for line in body.splitlines():
+            code, _, comment = map(str.strip, line.partition("//"))
+            if kind == "enum":
+                entries += [(value, "") for value in re.findall(r"[A-Z]\w+", code)]
+            elif match := re.match(r"(.+?)\s+(\w+)(\[\d+\])?;$", code):
+                entries.append((match[1] + (match[3] or ""), match[2], ""))
+            if comment and entries:
+                entries[-1] = (*entries[-1][:-1], f"{entries[-1][-1]} {comment}".strip())
+        (enums if kind == "enum" else structs)[name] = entries
     return structs, enums, comments
 
 

@@ -15,19 +15,6 @@ def say(text):
 
 
 @dataclasses.dataclass
-class Ended:
-    """How one command ended."""
-
-    code: int | None = None  # None: it was not finished
-    seconds: float = 0.0
-    stopped: str = ""  # why it was not finished
-
-    def __str__(self):
-        minutes, seconds = divmod(round(self.seconds), 60)
-        return f"{self.stopped or f'exit {self.code}'}, {minutes} min {seconds} s"
-
-
-@dataclasses.dataclass
 class Tests:
     passed: int = 0
     failed: list = dataclasses.field(default_factory=list)
@@ -72,17 +59,18 @@ class Column:
     def run(self, row, system, name, *command, here=False):
         """Runs a command in the tree `system`, or on this machine; puts how it ended into a row. True if with 0."""
         say(f"{self.system}: {row} (log: {system.log(name)})")
-        ended, start = Ended(), time.monotonic()
+        code, end, start = None, "", time.monotonic()
         try:
-            ended.code = (system.run_here if here else system.run)(name, *command)
+            code = (system.run_here if here else system.run)(name, *command)
+            end = f"exit {code}"
         except tree.Failure as failure:
-            ended.stopped = str(failure)
+            end = str(failure)
             raise
         finally:
-            ended.seconds = time.monotonic() - start
-            self.is_good &= ended.code == 0
-            self.rows[row] = str(ended)
-        return ended.code == 0
+            minutes, seconds = divmod(round(time.monotonic() - start), 60)
+            self.is_good &= code == 0
+            self.rows[row] = f"{end}, {minutes} min {seconds} s"
+        return code == 0
 
 
 def make_table(columns):

@@ -9,21 +9,89 @@
 #include "common/bus/qos_file.hpp"
 #include "common/config/config_error.hpp"
 #include "recorder/sinks/csv/csv_reader.hpp"
-#include "tools/view/foxglove/protocol.hpp"
+#include "tools/view/foxglove/session.hpp"
 #include "tools/view/live/feed.hpp"
 #include "tools/view/live/operator.hpp"
 #include "tools/view/live/page_protocol.hpp"
-#include "tools/view/options.hpp"
 #include "tools/view/page/page.hpp"
 #include "tools/view/replay/export.hpp"
 #include "tools/view/replay/recorded_run.hpp"
 #include "tools/view/ros_face/ros_face.hpp"
+#include "tools/view/web/server.hpp"
 
 namespace {
 
 using namespace sls;
 
 constexpr double kSignalTime = 0.1;  // s between two looks for a stop signal
+
+// --- the command line ----------------------------------------------------------------------------
+
+struct Options {
+  app::CommonOptions common;
+  std::vector<std::filesystem::path> recordings;      ///< empty: live
+  std::filesystem::path export_file;                  ///< empty: serve the page
+  std::size_t most_bytes = view::kMostExportedBytes;  ///< size limit of `export_file`
+  std::uint32_t vehicle_id = 0;
+  std::string identity = "viewer";  ///< role whose keys it uses on a secured domain
+  bool has_ros_face = false;
+  std::filesystem::path token_file;  ///< empty: no token
+  view::ServerOptions server;
+
+  /// Puts the token and the address into `server`.
+  /// @throws config::ConfigError as load_token and `check`, and if two options exclude each other.
+  void complete();
+};
+
+void add_options(CLI::App& cli, Options& options) {
+  app::add_common_options(cli, options.common);
+  cli.add_option("DIR", options.recordings,
+                 "one or two recordings to replay (default: the live flight on the domain)")
+      ->expected(0, 2)
+      ->type_name("")
+      ->default_str("");
+  cli.add_option("--vehicle", options.vehicle_id, "watch the server that flies vehicle N")
+      ->type_name("N");
+  cli.add_option("--listen", options.server.address,
+                 "address to listen on; addresses other than loopback need --token-file")
+      ->type_name("ADDRESS");
+  cli.add_option("--port", options.server.port, "port to listen on; 0: any free port")
+      ->type_name("N");
+  cli.add_option("--token-file", options.token_file,
+                 "file whose first line is the token that enables a page's buttons")
+      ->type_name("FILE");
+  cli.add_flag("--read-only", options.server.access.is_read_only, "show no buttons on any page");
+  cli.add_option("--allow-origin", options.server.access.allowed_origins,
+                 "other origin whose pages may connect, and operate with the token, such as "
+                 "https://app.foxglove.dev; repeatable")
+      ->type_name("URL")
+      ->expected(1)
+      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
+      ->default_str("");
+  cli.add_flag("--ros", options.has_ros_face, "also publish the flight on ROS 2 topics");
+  cli.add_option("--identity", options.identity,
+                 "role whose keys to use on a secured domain; operator enables buttons")
+      ->type_name("NAME");
+  cli.add_option("--export", options.export_file,
+                 "write a page that contains the recordings to FILE and exit")
+      ->type_name("FILE");
+  cli.add_option("--most-bytes", options.most_bytes,
+                 "largest size of the file of --export; steps are left out to fit")
+      ->type_name("N");
+}
+
+void Options::complete() {
+  if (!export_file.empty() && recordings.empty())
+    throw config::ConfigError("--export: expected a recording with it, got none");
+  if (has_ros_face && !recordings.empty())
+    throw config::ConfigError("--ros: expected no recording with it, got " +
+                              recordings.front().string());
+  if (!token_file.empty()) server.access.token = view::load_token(token_file.string());
+  server.access.address = server.address;
+  view::check(server.access);
+}
+
+// --- what it does --------------------------------------------------------------------------------
 
 view::Resource make_page() {
   view::Resource page;
@@ -42,7 +110,7 @@ void serve(view::Server& server) {
   server.run();
 }
 
-void watch(const view::Options& options) {
+void watch(const Options& options) {
   view::Server server(options.server);
   bus::Node node(options.common.qos_file, options.common.domain, "sls_view", options.identity,
                  bus::Transports::kNetwork);
@@ -63,7 +131,7 @@ void watch(const view::Options& options) {
 }
 
 /// Reads everything once at the start, because recordings do not change while they are shown.
-void replay(const view::Options& options) {
+void replay(const Options& options) {
   view::Server server(options.server);
   const std::size_t count = options.recordings.size();
   for (std::size_t index = 0; index < count; ++index) {
@@ -81,7 +149,7 @@ void replay(const view::Options& options) {
   serve(server);
 }
 
-void run(const view::Options& options) {
+void run(const Options& options) {
   if (!options.export_file.empty())
     view::export_page(options.export_file, view::page_html_gz(), options.recordings,
                       options.most_bytes);
@@ -92,7 +160,7 @@ void run(const view::Options& options) {
 }
 
 /// A damaged recording counts as bad usage: exit code 2.
-void run_checked(const view::Options& options) {
+void run_checked(const Options& options) {
   try {
     run(options);
   } catch (const record::DamagedError& error) {
@@ -105,9 +173,9 @@ void run_checked(const view::Options& options) {
 int main(int argc, char** argv) {
   CLI::App cli(
       "Shows a live or recorded flight in the browser, and a live one in Foxglove and ROS 2.");
-  view::Options options;
+  Options options;
   options.common.qos_file = bus::default_qos_file();
-  view::add_options(cli, options);
+  add_options(cli, options);
 
   return app::run_main(argc, argv, cli, options.common, "sls_view", [&] {
     options.complete();

@@ -2,7 +2,6 @@
 
 #include <fastdds/dds/log/Log.hpp>
 
-#include <functional>
 #include <string>
 
 namespace sls::bus {

@@ -1,10 +1,26 @@
-"""Command lines of campaigns: a parser and types of arguments."""
+"""What the command lines of the package share: a parser, types of arguments, signals that end a command."""
 
 import argparse
 import re
+import signal
 from typing import NoReturn
 
 from sls.input_error import InputError
+
+
+class Ended(KeyboardInterrupt):
+    """SIGTERM or SIGHUP."""
+
+
+def raise_ended(*_: object) -> None:
+    raise Ended
+
+
+def catch_end_signals() -> None:
+    """Makes SIGTERM and SIGHUP raise Ended. A signal that is ignored, as SIGHUP is under nohup, stays ignored."""
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            signal.signal(number, raise_ended)
 
 
 class Parser(argparse.ArgumentParser):

@@ -2,6 +2,7 @@
 
 This module holds values only. `campaign_file` reads them, `sampling` draws from them."""
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -113,10 +114,7 @@ class Campaign:
     def points(self) -> int:
         """Number of combinations of all grids and lists; 1 without any. Run i flies draw i // points
         at point i % points."""
-        points = 1
-        for varied in self.varied:
-            points *= len(varied.items) if varied.is_crossed else 1
-        return points
+        return math.prod(len(varied.items) for varied in self.varied if varied.is_crossed)
 
     @property
     def draws(self) -> int:

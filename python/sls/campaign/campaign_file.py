@@ -145,11 +145,7 @@ class _Reader:
     def _read_varied(self, path: str, place: Place) -> Varied:
         values = place.read_map("a map such as { uniform: [1, 2], seed: 1 }",
                                 (*KINDS, *DRAW_OPTIONS))
-        kinds = [key for key in values if key in KINDS]
-        if len(kinds) != 1:
-            place.fail(f"expected exactly one of {', '.join(KINDS)}, got "
-                       + (" and ".join(kinds) if kinds else "none"))
-        kind = kinds[0]
+        kind = place.find_one(values, KINDS)
         for key in values:
             if key != kind and key not in OPTIONS.get(kind, DRAW_OPTIONS):
                 values[key].fail(f"expected no such key beside {kind}, got {values[key].brief}")
@@ -242,11 +238,9 @@ class _Reader:
         if "measure" not in self.values:
             return DEFAULT_MEASURES, ()
         place = self.values["measure"]
-        if not place.is_list or not place.list_items():
-            place.fail_expected("a list of measures")
         names: list[str] = []
         own_measures: list[OwnMeasure] = []
-        for item in place.list_items():
+        for item in place.read_list("a list of measures"):
             if item.is_map:
                 own_measures.append(self._read_own_measure(item, own_measures))
                 continue
@@ -268,12 +262,10 @@ class _Reader:
         function = function_place.read_text("the name of a function")
         if not function.isidentifier():
             function_place.fail_expected("the name of a function")
-        columns_place = place.require(values, "columns", "a list of columns of runs.csv")
-        if not columns_place.is_list or not columns_place.list_items():
-            columns_place.fail_expected("a list of columns of runs.csv")
         columns: list[str] = []
         taken = {column for other in others for column in other.columns}
-        for item in columns_place.list_items():
+        expected = "a list of columns of runs.csv"
+        for item in place.require(values, "columns", expected).read_list(expected):
             column = item.read_text("a column of a-z 0-9 _")
             if not COLUMN.fullmatch(column):
                 item.fail_expected("1 to 64 of a-z 0-9 _, beginning with a letter")
@@ -319,7 +311,6 @@ class _Reader:
 
 def _read_grid(place: Place) -> tuple[int | float, ...]:
     """Evenly spaced numbers, each rounded once from the exact decimal."""
-    form = "[from, to, how many values] or { from, to, values }"
     is_log = False
     if place.is_map:
         values = place.read_map(known=("from", "to", "values", "log"))
@@ -328,10 +319,8 @@ def _read_grid(place: Place) -> tuple[int | float, ...]:
             is_log = values["log"].find_scalar()
             if not isinstance(is_log, bool):
                 values["log"].fail_expected("true or false")
-    elif place.is_list and len(place.list_items()) == 3:
-        parts = place.list_items()
     else:
-        place.fail_expected(form)
+        parts = place.read_list("[from, to, how many values] or { from, to, values }", 3)
     start, end = parts[0].read_number(), parts[1].read_number()
     count = parts[2].read_whole(1, MOST_ITEMS)
     if count == 1 and start != end:
@@ -352,17 +341,14 @@ def _read_grid(place: Place) -> tuple[int | float, ...]:
 
 
 def _read_list(place: Place) -> tuple[Any, ...]:
-    if not place.is_list or not place.list_items():
-        place.fail_expected("a list of values")
-    if len(place.list_items()) > MOST_ITEMS:
+    items = place.read_list("a list of values")
+    if len(items) > MOST_ITEMS:
         place.fail_expected(f"at most {MOST_ITEMS} values")
-    return tuple(item.read_value() for item in place.list_items())
+    return tuple(item.read_value() for item in items)
 
 
 def _read_bounds(place: Place) -> tuple[float, float]:
-    if not place.is_list or len(place.list_items()) != 2:
-        place.fail_expected("[least, most]")
-    least, most = (float(item.read_number()) for item in place.list_items())
+    least, most = (float(item.read_number()) for item in place.read_list("[least, most]", 2))
     if not least < most:
         place.fail(f"expected the lower bound first, got [{least!r}, {most!r}]")
     return least, most
@@ -379,9 +365,7 @@ def _read_distribution(kind: str, place: Place) -> tuple[str, tuple[float, float
     elif kind in SPREADS:
         kind = "uniform"
     if kind == "normal":
-        if not place.is_list or len(place.list_items()) != 2:
-            place.fail_expected("[mean, standard deviation]")
-        mean, deviation = (float(item.read_number()) for item in place.list_items())
+        mean, deviation = (float(item.read_number()) for item in place.read_list("[mean, standard deviation]", 2))
         if not deviation > 0:
             place.list_items()[1].fail_expected("> 0")
         return kind, (mean, deviation)
@@ -393,9 +377,7 @@ def _read_distribution(kind: str, place: Place) -> tuple[str, tuple[float, float
 
 def _read_expressions(place: Place) -> Any:
     if place.is_list:
-        if not place.list_items():
-            place.fail_expected("an expression, or a list of them")
-        return [_read_expressions(item) for item in place.list_items()]
+        return [_read_expressions(item) for item in place.read_list("an expression, or a list of them")]
     value = place.find_scalar()
     if value is None or isinstance(value, bool):
         place.fail_expected("an expression such as \"vehicle.load_mass_kg * 1.1\"")

@@ -6,8 +6,9 @@ import re
 from typing import Any, Protocol
 
 from sls.campaign.campaign import Campaign
-from sls.campaign.sampling import make_values, to_yaml_value
+from sls.campaign.sampling import make_values
 from sls.campaign.yaml_nodes import fail
+from sls.scenario import to_yaml_value
 
 MOST_LOOKED_AT = 100_000  # runs whose values are compared to find the extreme values
 MOST_SEARCHED = 20_000    # runs that are checked one by one to find the first that fails

@@ -2,8 +2,6 @@
 
 import argparse
 import shlex
-import signal
-import sys
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -12,11 +10,12 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from sls.campaign.arguments import Parser, parse_range, to_count
+from sls.campaign.arguments import Ended, Parser, catch_end_signals, parse_range, to_count
 from sls.campaign.engines import ENGINES, EngineError, EngineOptions, load_engine
 from sls.campaign.folder import CampaignFolder, opened
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
+from sls.launcher.place import say
 from sls.scenario import ROOT
 
 MOST_CHUNKS = 10_000  # files in a folder
@@ -28,14 +27,6 @@ OTHER_COMMANDS = """commands for flown campaigns:
   ./sls campaign status DIR    print chunks, rate and outcomes so far
   ./sls campaign report DIR    write DIR/report.html again
   ./sls campaign compare A B   compare two campaigns run by run"""
-
-
-class Ended(KeyboardInterrupt):
-    """SIGTERM or SIGHUP."""
-
-
-def say(text: str) -> None:
-    print(f"sls: {text}", file=sys.stderr)
 
 
 # --- flying ---------------------------------------------------------------------------------------
@@ -104,8 +95,10 @@ def fly(options: argparse.Namespace) -> None:
             say_how_to_resume(folder, options)
             raise
         say_result(folder)
-        if options.verify and not verify(folder, options):
-            raise EngineError(f"{out}: --verify: expected equal certificates, got others")
+        if options.verify:
+            from sls.campaign.verify import verify
+            if not verify(folder, options.verify, say, options.domain):
+                raise EngineError(f"{out}: --verify: expected equal certificates, got others")
         if (broken := describe_broken_measures(folder.manifest)) and not options.allow_broken_measures:
             raise EngineError(f"{out}: {broken} (--allow-broken-measures ends without an error)")
 
@@ -203,11 +196,6 @@ def say_how_to_resume(folder: CampaignFolder, options: argparse.Namespace) -> No
         f"{shlex.join(command)}")
 
 
-def verify(folder: CampaignFolder, options: argparse.Namespace) -> bool:
-    from sls.campaign.verify import verify as verify_runs
-    return verify_runs(folder, options.verify, say, options.domain)
-
-
 # --- other commands -------------------------------------------------------------------------------
 
 
@@ -282,15 +270,9 @@ def show_comparison(arguments: Sequence[str]) -> None:
 COMMANDS = {"status": show_status, "report": make_report, "compare": show_comparison}
 
 
-def raise_ended(*_: object) -> None:
-    raise Ended
-
-
 def main(arguments: Sequence[str]) -> int:
     """Runs the command and returns the exit code."""
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:  # nohup ignores SIGHUP: leave it so
-            signal.signal(number, raise_ended)
+    catch_end_signals()
     try:
         if arguments and arguments[0] in COMMANDS:
             COMMANDS[arguments[0]](arguments[1:])

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from sls.campaign.drawing import format_number
+from sls.campaign.folder import read_manifest
 from sls.campaign.pairs import Pairs, describe_changes, make_measure_rows, make_outcome_rows
-from sls.campaign.report import flatten, read_manifest
+from sls.campaign.report import flatten
 from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs, to_word
 from sls.input_error import InputError
 
@@ -39,7 +40,7 @@ def compare(a: Path, b: Path) -> str:
     check_values(*tables, *places)
     lines += describe_runs(*tables, len(places[0]))
     pairs = Pairs(*tables, *places, "A", "B")
-    lines += compare_outcomes(pairs)
+    lines += ["", "outcomes", *make_text_table(make_outcome_rows(pairs)), f"  {describe_changes(pairs)}"]
     lines += compare_measures(pairs)
     lines += list_most_different(pairs)
     return "\n".join([*lines, ""])
@@ -119,10 +120,6 @@ def describe_runs(a: RunTable, b: RunTable, common: int) -> list[str]:
     if only:
         lines.append(f"  measured only in one: {', '.join(only)}")
     return lines
-
-
-def compare_outcomes(pairs: Pairs) -> list[str]:
-    return ["", "outcomes", *make_text_table(make_outcome_rows(pairs)), f"  {describe_changes(pairs)}"]
 
 
 def compare_measures(pairs: Pairs) -> list[str]:

@@ -357,16 +357,30 @@ class CampaignFolder:
     @property
     def manifest(self) -> dict[str, Any]:
         """The manifest in the folder. Raises InputError if there is none."""
-        file = self.folder / "manifest.json"
-        try:
-            return json.loads(file.read_text())
-        except OSError as error:
-            raise InputError(f"{file}: expected to read it, got: {error.strerror}") from None
-        except ValueError as error:
-            raise InputError(f"{file}: expected JSON, got: {error}") from None
+        return read_manifest(self.folder / "manifest.json")
 
     def write_manifest(self, manifest: dict[str, Any]) -> None:
         write_whole(self.folder / "manifest.json", (json.dumps(manifest, indent=1) + "\n").encode())
+
+
+def read_text(file: Path) -> str:
+    """The text of a file of a campaign. Raises InputError."""
+    try:
+        return file.read_text()
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "bytes that are no text"
+        raise InputError(f"{file}: expected a file of a campaign, got: {reason}") from None
+
+
+def read_manifest(file: Path) -> dict[str, Any]:
+    """The manifest of a campaign. Raises InputError."""
+    try:
+        manifest = json.loads(read_text(file))
+    except ValueError as error:
+        raise InputError(f"{file}: expected JSON, got: {error}") from None
+    if not isinstance(manifest, dict) or not {"campaign", "file"} <= manifest.keys():
+        raise InputError(f"{file}: expected the manifest of a campaign, got {str(manifest):.40}")
+    return manifest
 
 
 def to_line(cells: Sequence[str]) -> bytes:

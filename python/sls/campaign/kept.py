@@ -6,10 +6,9 @@ certificate of the run's row."""
 
 import heapq
 import json
-import math
 import os
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,15 +34,6 @@ def is_kept(campaign: Campaign, row: dict[str, str]) -> bool:
     """True if the recording of this row is kept because of its outcome (`keep: all` or `keep: failed`)."""
     kind = campaign.keep.kind
     return kind == "all" or kind == "failed" and row["outcome"] != "finished"
-
-
-def keep_while_flying(folder: CampaignFolder, campaign: Campaign, runs: "Runs",
-                      cells: Sequence[str]) -> None:
-    """Writes the recording of a run just flown, if the campaign keeps it. Raises EngineError if it cannot
-    be written."""
-    row = dict(zip(folder.plan.columns, cells))
-    if is_kept(campaign, row):
-        keep_run(folder, campaign, runs, row)
 
 
 def keep_run(folder: CampaignFolder, campaign: Campaign, runs: "Runs",
@@ -107,15 +97,7 @@ def list_worst(folder: CampaignFolder, campaign: Campaign) -> list[dict[str, str
 
     def rank(row: dict[str, str]) -> tuple[float, int]:
         return float(row[column]), -int(row["run"])
-    rows = (row for row in folder.read_rows() if is_number(row[column]))
-    return heapq.nlargest(campaign.keep.count, rows, rank)
-
-
-def is_number(text: str) -> bool:
-    try:
-        return not math.isnan(float(text))
-    except ValueError:
-        return False
+    return heapq.nlargest(campaign.keep.count, (row for row in folder.read_rows() if row[column]), rank)
 
 
 def list_kept(folder: CampaignFolder, campaign: Campaign) -> Iterator[dict[str, str]]:

@@ -63,12 +63,8 @@ def describe_machine() -> dict[str, str]:
         "python": platform.python_version(),
         "numpy": find_version("numpy"),
         "scipy": find_version("scipy"),
-        "core": describe_core(),
+        "core": hashlib.sha256(Path(str(load_core().__file__)).read_bytes()).hexdigest()[:16],
     }
-
-
-def describe_core() -> str:
-    return hashlib.sha256(Path(str(load_core().__file__)).read_bytes()).hexdigest()[:16]
 
 
 def host_name() -> str:

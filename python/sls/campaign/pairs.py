@@ -47,9 +47,8 @@ def describe_interval(is_counted: np.ndarray, draw: np.ndarray | None) -> str:
 
 
 def find_pairs(table: RunTable, key: str) -> Pairs | None:
-    """Pairs of runs that differ only in `key`, which must have exactly two values, whose texts are the
-    names. None if the key has another number of
-    values, or if fewer than half of the runs form pairs."""
+    """Pairs of runs that differ only in `key`, named by its two values. None if the key has another number of values,
+    or if fewer than half of the runs form pairs."""
     if key in table.words:
         names, side = table.words[key]
     else:

@@ -4,7 +4,6 @@ It uses only runs.csv, campaign.yaml and manifest.json. For this reason it can b
 place of the folder, and equal files give equal bytes. Its size does not grow with the number of runs,
 because pictures show bins or samples."""
 
-import json
 import math
 import shlex
 from collections.abc import Sequence
@@ -18,12 +17,12 @@ import yaml
 
 from sls.campaign import drawing
 from sls.campaign.drawing import OUTCOME_COLOURS, Scale, format_number, format_share, name_unit
+from sls.campaign.folder import read_manifest, read_text
 from sls.campaign.pairs import (describe_changes, describe_interval, find_pairs, make_measure_rows,
                                 make_outcome_rows)
 from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs
 from sls.campaign.statistics import calc_quantiles, calc_share_interval
-from sls.input_error import InputError
-from sls.report import STYLE_SHEET, escape, make_section
+from sls.report import escape, join_page, make_fact_list, make_plain_table, make_section
 
 MOST_VALUES = 41  # a key with more values gets bins of equal width instead of one bin per value
 BINS = 20
@@ -35,7 +34,7 @@ MOST_COLUMNS = 80  # drawn distributions
 MOST_REASONS = 20
 WORST = 10
 SHARES = (0.05, 0.5, 0.95)
-STYLE = STYLE_SHEET + """
+STYLE = """
 svg { display: block; width: 100%; height: auto; margin: 0 auto 8px; }
 .pair { display: grid; grid-template-columns: repeat(2, 1fr); gap: 8px 20px; }
 .pair > * { min-width: 0; }
@@ -75,35 +74,10 @@ def make_campaign_report(folder: Path) -> str:
             make_section("All together", make_parallel(table)),
             make_section("Worst runs", make_worst(table, manifest["file"])),
         ]
-    sections += [make_section("Campaign", make_facts(manifest)),
+    sections += [make_section("Campaign", make_fact_list(flatten(manifest))),
                  "<section><details><summary>Campaign file</summary>"
                  f"<pre>{escape(campaign_text)}</pre></details></section>"]
-    return ("<!DOCTYPE html>\n<html lang=\"en\">\n<head><meta charset=\"utf-8\">\n"
-            "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-            "<link rel=\"icon\" href=\"data:,\">\n"
-            f"<title>{escape(name)}: campaign report</title>\n<style>{STYLE}</style></head>\n"
-            f"<body><main>\n{''.join(sections)}</main></body>\n</html>\n")
-
-
-# --- input files ----------------------------------------------------------------------------------
-
-
-def read_text(file: Path) -> str:
-    try:
-        return file.read_text()
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "bytes that are no text"
-        raise InputError(f"{file}: expected a file of a campaign, got: {reason}") from None
-
-
-def read_manifest(file: Path) -> dict[str, Any]:
-    try:
-        manifest = json.loads(read_text(file))
-    except ValueError as error:
-        raise InputError(f"{file}: expected JSON, got: {error}") from None
-    if not isinstance(manifest, dict) or not {"campaign", "file"} <= manifest.keys():
-        raise InputError(f"{file}: expected the manifest of a campaign, got {str(manifest):.40}")
-    return manifest
+    return join_page(name, sections, "campaign report", STYLE)
 
 
 # --- classes of a varied key ----------------------------------------------------------------------
@@ -190,14 +164,6 @@ def make_head(name: str, table: RunTable) -> str:
     varied = ", ".join(table.keys) or "nothing"
     return (f"<header><h1>{escape(name)}</h1><p class=\"sub\">{badges}{count} "
             f"{'run' if count == 1 else 'runs'}; varied: {escape(varied)}</p></header>\n")
-
-
-def make_plain_table(header: Sequence[str], rows: Sequence[Sequence[str]], style: str = "") -> str:
-    """An HTML table. `header` and `rows` hold HTML."""
-    head = "".join(f"<th>{cell}</th>" for cell in header)
-    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
-    return (f"<div class=\"scroll\"><table{style}><thead><tr>{head}</tr></thead><tbody>{body}"
-            "</tbody></table></div>")
 
 
 def make_outcomes(table: RunTable) -> str:
@@ -432,12 +398,6 @@ def shorten(cell: str) -> str:
         return format_number(float(cell))
     except ValueError:
         return cell if len(cell) <= 40 else f"{cell[:39]}…"
-
-
-def make_facts(manifest: dict[str, Any]) -> str:
-    entries = "".join(f"<div><dt>{escape(key)}</dt><dd>{escape(value)}</dd></div>"
-                      for key, value in flatten(manifest))
-    return f"<dl class=\"facts\">{entries}</dl>"
 
 
 def flatten(value: Any, place: str = "") -> list[tuple[str, str]]:

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from sls.campaign.campaign import Campaign
-from sls.campaign.sampling import is_certified, make_values, to_yaml_value
+from sls.campaign.sampling import is_certified, make_values
 from sls.core import load_core
 from sls.errors import ConfigError
+from sls.scenario import to_yaml_value
 
 if TYPE_CHECKING:
     from _sls_core import Runs

@@ -10,7 +10,6 @@ They do not depend on the machine either. Of numpy's generators the raw words al
 processors."""
 
 import hashlib
-import json
 import warnings
 from collections.abc import Sequence
 from fractions import Fraction
@@ -53,26 +52,6 @@ def make_values(campaign: Campaign, first: int, last: int) -> list[list[Any]]:
     for varied in order_derived(campaign.varied):
         columns[varied.path] = _derive(campaign, varied, columns, first, last)
     return [list(row) for row in zip(*(columns[path] for path in campaign.paths), strict=True)]
-
-
-def to_yaml_value(value: Any) -> str:
-    """`value` as YAML in one line that reads back to the same bits. `value`: a number, a truth value, a
-    text, or a list or map of these."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, int):
-        return str(value)
-    if isinstance(value, float):
-        text = repr(value)
-        # Readers of YAML 1.1, such as Python's, read 1e-07 as text and 1.0e-07 as a number.
-        return text if "." in text or "e" not in text else text.replace("e", ".0e")
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)  # JSON is valid YAML
-    if isinstance(value, Sequence):
-        return "[" + ", ".join(to_yaml_value(item) for item in value) + "]"
-    keys = [key if key.isidentifier() else json.dumps(key, ensure_ascii=False) for key in value]
-    return "{" + ", ".join(f"{key}: {to_yaml_value(item)}"
-                           for key, item in zip(keys, value.values())) + "}"
 
 
 def choose_runs(runs: int, count: int, seed: int, purpose: str = "certify") -> list[int]:

@@ -14,7 +14,7 @@ from sls.input_error import InputError
 
 # Python, whose version the plan holds, and this package, which the user does not change.
 OTHERS = [Path(sysconfig.get_path("stdlib")).resolve(), Path(__file__).resolve().parents[1]]
-STARTED = {"__main__", "sitecustomize", "usercustomize"}  # what Python itself starts
+STARTED = {"__main__", "sitecustomize", "usercustomize"}  # modules that Python itself starts
 PACKAGES = {"site-packages", "dist-packages"}  # folders of installed packages
 
 

@@ -15,7 +15,7 @@ from sls.campaign.engines import EngineError
 from sls.campaign.folder import CampaignFolder
 from sls.campaign.runs import list_yaml_values, make_runs
 from sls.campaign.sampling import choose_runs, make_values
-from sls.campaign.whole_files import name_temporary
+from sls.campaign.whole_files import explained, name_temporary
 from sls.core import load_core
 from sls.launcher.place import BUILD, START
 from sls.dds_domain import own_domain
@@ -37,10 +37,8 @@ def written_scenario(text: str, base: Path, folder: Path) -> Iterator[Path]:
     if re.search(r"\.so\b", text):
         folder = base.parent
     file = name_temporary(folder / "verify").with_suffix(".yaml")
-    try:
+    with explained(file):
         file.write_text(text)
-    except OSError as error:
-        raise EngineError(f"{file}: expected to write it, got: {error.strerror}") from None
     try:
         yield file
     finally:
@@ -101,7 +99,7 @@ def verify(folder: CampaignFolder, count: int, say: Callable[[str], None],
 
 def fly_run_over_dds(campaign: Campaign, runs: "Runs", index: int, domain: int | None) -> str:
     text = runs.scenario_text(list_yaml_values(campaign, make_values(campaign, index, index)[0]))
-    text = load_core().Scenario(None, text, str(campaign.base.parent), ALL_TAKE_PART).to_text()
+    text = load_core().Scenario(None, text, str(campaign.base.parent), ALL_TAKE_PART).text
     with tempfile.TemporaryDirectory(prefix="sls-verify-") as scratch, \
             written_scenario(text, campaign.base, Path(scratch)) as scenario:
         if domain is not None:

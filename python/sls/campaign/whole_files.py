@@ -4,6 +4,8 @@ import hashlib
 import os
 import time
 import uuid
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
@@ -48,6 +50,15 @@ def sync_folder(folder: Path) -> None:
         os.close(handle)
 
 
+@contextmanager
+def explained(file: Path) -> Iterator[None]:
+    """Raises EngineError, which names `file`, in place of an OSError."""
+    try:
+        yield
+    except OSError as error:
+        raise EngineError(f"{file}: expected to write it, got: {error.strerror}") from None
+
+
 class WholeFile:
     """Writes `file` piece by piece under a temporary name; `finish` renames it. Without `finish` the
     temporary file is removed. Raises EngineError, which names the file, if it cannot be written."""
@@ -57,34 +68,26 @@ class WholeFile:
         self.temporary = name_temporary(file)
 
     def __enter__(self) -> "WholeFile":
-        try:
+        with explained(self.file):
             self.stream = open(self.temporary, "wb")
-        except OSError as error:
-            raise self._explain(error) from None
         return self
 
     def write(self, data: bytes) -> None:
-        try:
+        with explained(self.file):
             self.stream.write(data)
-        except OSError as error:
-            raise self._explain(error) from None
 
     def sync(self) -> None:
         """Writes the data to the disk, still under the temporary name."""
-        try:
+        with explained(self.file):
             self.stream.flush()
             os.fsync(self.stream.fileno())
-        except OSError as error:
-            raise self._explain(error) from None
 
     def finish(self) -> None:
         """Gives the file its name. Replaces a file with this name."""
         self.sync()
-        try:
+        with explained(self.file):
             os.replace(self.temporary, self.file)
             sync_folder(self.file.parent)
-        except OSError as error:
-            raise self._explain(error) from None
 
     def finish_new(self) -> bool:
         """As `finish`, but returns False and changes nothing if a file with this name exists."""
@@ -98,20 +101,13 @@ class WholeFile:
                 return False
             self.finish()
             return True
-        try:
+        with explained(self.file):
             sync_folder(self.file.parent)
-        except OSError as error:
-            raise self._explain(error) from None
         return True
 
-    def _explain(self, error: OSError) -> EngineError:
-        return EngineError(f"{self.file}: expected to write it, got: {error.strerror}")
-
     def __exit__(self, *_: object) -> None:
-        try:
+        with suppress(OSError):  # the disk is full: `write` or `sync` has already raised the error
             self.stream.close()
-        except OSError:  # the disk is full: `write` or `sync` has already raised the error
-            pass
         self.temporary.unlink(missing_ok=True)
 
 

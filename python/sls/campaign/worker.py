@@ -14,7 +14,7 @@ from typing import TextIO
 from sls.campaign.arguments import Parser, parse_range
 from sls.campaign.engines import EngineError
 from sls.campaign.folder import CampaignFolder, DamagedChunk
-from sls.campaign.kept import keep_while_flying
+from sls.campaign.kept import is_kept, keep_run
 from sls.campaign.own_measures import load_own_measures
 from sls.campaign.runs import Announce, RefusedRun, fly_range, make_runs
 from sls.errors import ConfigError, RunError
@@ -52,7 +52,9 @@ class ChunkFlyer:
             pass
         rows = []
         for cells in fly_range(self.campaign, self.runs, first, last, self.own, announce):
-            keep_while_flying(self.folder, self.campaign, self.runs, cells)
+            row = dict(zip(self.folder.plan.columns, cells))
+            if is_kept(self.campaign, row):
+                keep_run(self.folder, self.campaign, self.runs, row)
             rows.append(cells)
         wall_s = time.monotonic() - begin
         self.folder.write_chunk(number, rows, wall_s)

@@ -100,6 +100,19 @@ class Place:
             self.at(key, self.node).fail(f"missing key; expected {expected}")
         return values[key]
 
+    def find_one(self, values: dict[str, "Place"], kinds: Collection[str]) -> str:
+        """The one of these keys that `values`, read from this map, has. Refuses none and several."""
+        found = [key for key in values if key in kinds]
+        if len(found) != 1:
+            self.fail(f"expected exactly one of {', '.join(kinds)}, got {' and '.join(found) or 'none'}")
+        return found[0]
+
+    def read_list(self, expected: str, count: int | None = None) -> list["Place"]:
+        """The items of a list: `count` of them, or at least one."""
+        if not self.is_list or not self.node.value or count not in (None, len(self.node.value)):
+            self.fail_expected(expected)
+        return self.list_items()
+
     def find_scalar(self) -> bool | int | float | str | None:
         """The value of a scalar; None for a list, a map, nothing and a number that is not finite."""
         if not isinstance(self.node, yaml.ScalarNode) or self.is_nothing:

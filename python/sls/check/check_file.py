@@ -6,7 +6,7 @@ import os
 import re
 import shutil
 import signal
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -51,7 +51,7 @@ class Expectation:
     window_s: tuple[float, float] | None = None
     vehicle: int | None = None
     over: str = "max"
-    options: Mapping[str, Any] = field(default_factory=dict)  # further ones of a measure
+    options: Mapping[str, Any] = field(default_factory=dict)  # other options of the measure
     reason: str = ""
     because: str = ""
     expression: Expression | None = None
@@ -146,9 +146,7 @@ def load_check(file: Path, library: Path | None = None) -> Check:
         scenario = put_library(controller, scenario, scenario_file)
     check = Check(file, file.stem, scenario_file, scenario, (), controller)
     items = root.require(values, "expect", "a list of expectations")
-    if not items.is_list or not items.node.value:
-        items.fail_expected("a list of expectations")
-    expectations = [read_expectation(item, scenario) for item in items.list_items()]
+    expectations = [read_expectation(item, scenario) for item in items.read_list("a list of expectations")]
     if not any(one.kind == "outcome" for one in expectations):
         expectations.insert(0, Expectation(items, "outcome", "finished"))
     limit = values.get("limit_s")
@@ -190,7 +188,7 @@ def read_expectation(place: Place, scenario: "Scenario") -> Expectation:
         "reason": lambda at: at.read_text("a text"), "because": lambda at: at.read_text("a text")}
     known = ("min", "max", *readers)
     values = place.read_map("an expectation, such as { measure: load_error_rms_m, max: 0.02 }", (*KINDS, *known))
-    kind = find_one(place, values, KINDS)
+    kind = place.find_one(values, KINDS)
     made = read_kind(place, kind, values[kind])
     allowed = (*KEYS[kind], "because", *(MEASURES[made.what].options if kind == "measure" else ()))
     for key in values:
@@ -282,7 +280,7 @@ def read_participants(place: Place) -> Participant | None:
         "silent_s": lambda at: read_positive(at, "seconds"),
         "stop": lambda at: signal.Signals[read_word(at, STOPS)]}
     keys = own.read_map("a controller: command, python or library", (*CONTROLLERS, *readers))
-    kind = find_one(own, keys, CONTROLLERS)
+    kind = own.find_one(keys, CONTROLLERS)
     folder = own.file.parent.resolve()
     words = read_words(keys[kind], kind, folder)
     for key in keys:
@@ -290,14 +288,6 @@ def read_participants(place: Place) -> Participant | None:
             keys[key].fail(f"expected no such key beside {kind}, got one")
     more = {key: readers[key](value) for key, value in keys.items() if key != kind}
     return Participant(own, kind, words, folder, **more)
-
-
-def find_one(place: Place, values: Mapping[str, Place], kinds: Iterable[str]) -> str:
-    """The one of these keys that is there."""
-    found = [kind for kind in kinds if kind in values]
-    if len(found) != 1:
-        place.fail(f"expected exactly one of {', '.join(kinds)}, got {' and '.join(found) or 'none'}")
-    return found[0]
 
 
 def read_words(what: Place, kind: str, folder: Path) -> tuple[str, ...]:
@@ -309,9 +299,8 @@ def read_words(what: Place, kind: str, folder: Path) -> tuple[str, ...]:
         if not name.isidentifier() or not (folder / file).is_file():
             what.fail_expected(expected)
         return (f"{folder / file}{colon}{name if colon else ''}",)
-    if not what.is_list or not what.node.value:
-        what.fail_expected("a list of words: program and arguments")
-    words = tuple(item.read_text("a word in quotes") for item in what.list_items())
+    words = tuple(item.read_text("a word in quotes")
+                  for item in what.read_list("a list of words: program and arguments"))
     if not (os.access(folder / words[0], os.X_OK) if "/" in words[0] else shutil.which(words[0])):
         what.list_items()[0].fail_expected("a program that exists")
     return words
@@ -332,10 +321,8 @@ def put_library(controller: Participant, scenario: "Scenario", file: Path) -> "S
 def read_placements(place: Place | None, check: Check) -> tuple[str, ...]:
     if place is None:
         return ("shm",) if check.controller and check.controller.kind == "command" else ("in-process",)
-    if not place.is_list or not place.node.value:
-        place.fail_expected(f"a list of {', '.join(PLACEMENTS)}")
     names = []
-    for item in place.list_items():
+    for item in place.read_list(f"a list of {', '.join(PLACEMENTS)}"):
         name = read_word(item, PLACEMENTS)
         if refusal := find_refusal(check, name):
             item.fail(f"expected {refusal}, got {name}")

@@ -5,14 +5,13 @@ import multiprocessing
 import os
 import shutil
 import signal
-import sys
 import tempfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from sls.campaign.arguments import Parser, to_count
+from sls.campaign.arguments import Ended, Parser, catch_end_signals, to_count
 from sls.check.check_file import Check, find_checks, find_refusal, load_check
 from sls.check.difference import find_difference
 from sls.check.faults import PLACEMENTS, WORDS, Fault, check_able, parse_fault
@@ -21,15 +20,12 @@ from sls.check.judge import judge, open_recording
 from sls.check.results import HELD, Result, find_code, make_rows, write_json, write_junit
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
+from sls.launcher.place import say
 
 MOST_LOG_LINES = 30
 MEANING = "Flies the scenario of each check file and judges its recording."
 EXIT_CODES = """exit codes: 0 every expectation held; 1 one did not hold; 2 a check cannot be
 used; 130/143 interrupted"""
-
-
-class Ended(KeyboardInterrupt):
-    """SIGTERM or SIGHUP."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +36,6 @@ class Job:
     repeat: int
     repeats: int
     folder: Path
-
-
-def say(text: str) -> None:
-    print(f"sls: {text}", file=sys.stderr, flush=True)
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -156,7 +148,7 @@ def plan(options: argparse.Namespace, checks: Sequence[Check], folder: Path) -> 
 
 
 class Comparison:
-    """Compares the certificates of all flights of a check in lockstep, and removes recordings nobody needs any more."""
+    """Compares the certificates of all flights of a check in lockstep, and removes recordings without further use."""
 
     def __init__(self, keeps_failed: bool) -> None:
         self._first: dict[str, Result] = {}
@@ -216,7 +208,7 @@ def check_all(options: argparse.Namespace, folder: Path, results: list[Result]) 
             update(check, [one for one in results if one.file == str(check.file)])
     if options.report:
         from sls.check.pages import write_pages
-        write_pages(options.report, by_file, results)
+        write_pages(options.report, results)
 
 
 def update(check: Check, results: Sequence[Result]) -> None:
@@ -260,15 +252,9 @@ def print_results(results: Sequence[Result]) -> None:
           + ("; the flights of each check have equal bytes" if are_same else ""))
 
 
-def raise_ended(*_: object) -> None:
-    raise Ended
-
-
 def main(arguments: Sequence[str]) -> int:
     """Runs the command and returns the exit code. Whatever happens, --junit and --json are written."""
-    for number in (signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:
-            signal.signal(number, raise_ended)
+    catch_end_signals()
     results = list[Result]()
     given = {name: Path(word) for name in ("junit", "json")
              if (word := find_option(arguments, f"--{name}"))}

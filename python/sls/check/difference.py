@@ -22,7 +22,7 @@ def find_difference(a: Path, b: Path) -> str:
 
 
 def find_event_difference(a: Recording, b: Recording) -> str:
-    """What equal steps can hide: phases, take-overs and refused answers, as far as both recordings have them."""
+    """The first difference that equal steps can hide: in phases, take-overs and refused answers."""
     for one, other in zip_longest(list_changes(a), list_changes(b)):
         if one == other:
             continue

@@ -1,4 +1,4 @@
-"""Flies a check on one placement: starts the programs, does the faults, and says what went wrong with a program."""
+"""Flies a check on one placement: starts the programs, injects the faults and names the program that failed."""
 
 import json
 import os
@@ -23,8 +23,8 @@ from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor
 PROFILES = {"shm": "default", "udp": "udp", "hosts": "lan"}
 HOST_OF = {"sim_server": "server", "recorder": "recorder", "controller": "controller", "standby": "controller"}
 CONTROLLERS = ("controller", "standby")
-OVERRUN_S = 20.0  # the others end so much later than the first
-STOP_S = 10.0     # a process under test has so long to end after its stop signal
+OVERRUN_S = 20.0  # time in which the other programs must end after the first
+STOP_S = 10.0     # time in which a process under test must end after its stop signal
 # Without an engine or image `docker run` ends with this code; its first line says why, its last one is a hint.
 ENGINES, ENGINE_FAILED = ("docker", "podman"), 125
 WORLDS = 10       # of one flight of the placement `worlds`
@@ -144,7 +144,7 @@ class Programs:
         self._flown = flown
         self._hosts = hosts
         self._waiting = [fault for fault in faults if fault.word in ("kill", "stop_s", "partition_s")]
-        self._later: list[tuple[float, Any]] = []  # what ends a fault, and when
+        self._later: list[tuple[float, Any]] = []  # times and the calls that end a fault
         self._begin = self._grown = time.monotonic()
         self._step: int | None = None
         self._is_ready = not (self._own and self._own.ready)
@@ -268,7 +268,7 @@ class Programs:
     # --- afterwards -------------------------------------------------------------------------------
 
     def _conclude(self) -> None:
-        """Names the program that is to blame, if the recording alone does not say it."""
+        """Names the program that failed, if the recording alone does not say it."""
         codes = {name: code for name, code in self._programs.codes.items() if name not in self._programs.expendable}
         self._flown.is_unusable = self._is_engine_failure(codes.get("controller", 0)) or any(
             code == 2 and not (self._is_command and name in CONTROLLERS) for name, code in codes.items())

@@ -2,28 +2,26 @@
 
 import re
 import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
-from sls.check.check_file import Check
 from sls.check.results import HELD, NOT_HELD, Result
 from sls.errors import ConfigError, RunError
 from sls.recordings import Recording
-from sls.report import escape, join_page, make_report, make_section
+from sls.report import TEXT, escape, join_page, make_plain_table, make_report, make_section
 
 
-def write_pages(folder: Path, checks: Mapping[str, Check], results: Sequence[Result]) -> None:
+def write_pages(folder: Path, results: Sequence[Result]) -> None:
     """The page of each failed flight. FOLDER/index.html lists all flights. Raises OSError."""
     for result in results:
         if result.verdict != HELD and result.folder:
-            write_page(folder, checks[result.file], result)
-    rows = "".join(f"<tr><td>{name_flight(one, folder)}</td><td>{escape(one.verdict)}</td>"
-                   f"<td>{escape('; '.join(one.list_problems()[:1]))}</td></tr>" for one in results)
-    table = f"<div class=\"scroll\"><table class=\"text\">{rows}</table></div>"
+            write_page(folder, result)
+    table = make_plain_table((), [[name_flight(one, folder), escape(one.verdict),
+                                   escape("; ".join(one.list_problems()[:1]))] for one in results], TEXT)
     (folder / "index.html").write_text(join_page("checks", [make_section("Checks", table)]), encoding="utf-8")
 
 
-def write_page(folder: Path, check: Check, result: Result) -> None:
+def write_page(folder: Path, result: Result) -> None:
     """Moves recording and logs of the flight to FOLDER/NAME and writes FOLDER/NAME/report.html beside them."""
     kept = folder / re.sub(r"[^\w.-]+", "-", result.name)
     folder.mkdir(parents=True, exist_ok=True)
@@ -31,7 +29,7 @@ def write_page(folder: Path, check: Check, result: Result) -> None:
     shutil.move(result.folder, kept)
     page = kept / "report.html"
     result.folder, result.page = str(kept), str(page)
-    page.write_text(make_page(check, result, result.recording), encoding="utf-8")
+    page.write_text(make_page(result, result.recording), encoding="utf-8")
 
 
 def name_flight(result: Result, folder: Path) -> str:
@@ -39,7 +37,7 @@ def name_flight(result: Result, folder: Path) -> str:
     return f"<a href=\"{escape(Path(result.page).relative_to(folder))}\">{name}</a>" if result.page else name
 
 
-def make_page(check: Check, result: Result, folder: Path) -> str:
+def make_page(result: Result, folder: Path) -> str:
     sections = [make_section("Verdict", make_verdict(result)),
                 make_section("Output of the programs", make_logs(result))]
     missed = [one for one in result.judged if not one.is_held]
@@ -54,16 +52,14 @@ def make_page(check: Check, result: Result, folder: Path) -> str:
 
 
 def make_verdict(result: Result) -> str:
-    badges = {True: f"<span class=\"badge good\">{HELD}</span>", False: f"<span class=\"badge bad\">{NOT_HELD}</span>"}
-    rows = "".join(
-        f"<tr><td style=\"white-space: nowrap\">{badges[one.is_held]}</td>"
-        f"<td>{escape(one.text)}</td><td>{escape(one.got)} {escape(one.unit)}</td><td>{escape(one.bound)}</td>"
-        f"<td>{one.where}</td><td>{escape(one.because)}</td></tr>"
-        for one in result.judged)
-    head = "<tr><th>verdict</th><th>expectation</th><th>value</th><th>bound</th><th>worst at</th><th>because</th></tr>"
+    badges = {is_held: f"<span class=\"badge {style}\" style=\"white-space: nowrap\">{word}</span>"
+              for is_held, style, word in ((True, "good", HELD), (False, "bad", NOT_HELD))}
+    table = make_plain_table(
+        ("verdict", "expectation", "value", "bound", "worst at", "because"),
+        [[badges[one.is_held], escape(one.text), f"{escape(one.got)} {escape(one.unit)}", escape(one.bound), one.where,
+          escape(one.because)] for one in result.judged], TEXT)
     problems = "".join(f"<li>{escape(problem)}</li>" for problem in result.list_problems())
-    return (f"<p class=\"sub\">{escape(result.name)}: {result.verdict}</p><ul class=\"notes\">{problems}</ul>"
-            f"<div class=\"scroll\"><table class=\"text\"><thead>{head}</thead><tbody>{rows}</tbody></table></div>")
+    return f"<p class=\"sub\">{escape(result.name)}: {result.verdict}</p><ul class=\"notes\">{problems}</ul>{table}"
 
 
 def make_logs(result: Result) -> str:

@@ -39,7 +39,7 @@ def run_logged(log: Path, *command: str | Path, **more: Any) -> tuple[bool, str]
 
 def call_script(action: str, *words: str | Path) -> None:
     """Runs an action of the file `sls`, see its end: @setup LIST…, @install LIST…, @npm FOLDER, @tree PRESET FOLDER
-    TARGET…, @build TARGET…. With pip there is none: what it has not installed, an error of its user names."""
+    TARGET…, @build TARGET…. A pip installation has no such file: a command that lacks a package says so."""
     if IS_OF_PIP:
         return
     run(ROOT / "sls", *([] if is_installing else ["--no-install"]), action, *words)

@@ -24,13 +24,16 @@ CHOICES = re.compile(r"(?:[\w ]+: )?([a-z][\w-]*(?:(?:, | or )[a-z][\w-]*)+)(?= 
 def read_options(command: str) -> dict[str, tuple[str, str]]:
     """{option: (its argument, or empty; its meaning)}; none if the page or the command is not there."""
     page = PAGE.read_text(encoding="utf-8") if PAGE.is_file() else ""
-    section = page.partition(f"\n### ./sls {command}\n")[2].partition("\n### ")[0].partition("\n## ")[0]
-    if program := re.match(r"\nIt starts `(\w+)`", section):
+    common = {"--help": ("", "")}
+    if program := re.search(rf"^\| `\./sls {re.escape(command)}` \| \[(\w+)\]", page, re.MULTILINE):
         section = page.partition(f"\n## {program[1]}\n")[2].partition("\n## ")[0]
+        common["--version"] = ("", "")
+    else:
+        section = page.partition(f"\n### ./sls {command}\n")[2].partition("\n### ")[0].partition("\n## ")[0]
     section = re.sub(r"\n {4,}(?=[^\s-])", "  ", section)  # lines that go on
     found = {name: (argument, " ".join((cells or meaning).split()))
              for name, argument, cells, meaning in OPTION.findall(section)}
-    return {"--help": ("", ""), **found} if section else {}
+    return common | found if section or f"\n| `./sls {command}` |" in page else {}
 
 
 def list_values(argument: str, meaning: str) -> list[str]:

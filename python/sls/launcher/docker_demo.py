@@ -42,10 +42,6 @@ def is_done(*command: str | Path, limit_s: float | None = None) -> bool:
         return False
 
 
-def read(*command: str) -> str:
-    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
-
-
 # --- the image ------------------------------------------------------------------------------------
 
 
@@ -105,8 +101,9 @@ def fly(name: str, compose: list[str], recording: Path) -> int:
     say(f"flying {Path(os.environ['SLS_SCENARIO']).stem} with {file}")
 
     def find(service: str) -> str:
-        return read("docker", "ps", "--all", "--quiet", "--filter", f"label=com.docker.compose.project={project}",
-                    "--filter", f"label=com.docker.compose.service={service}")
+        words = ["docker", "ps", "--all", "--quiet", "--filter", f"label=com.docker.compose.project={project}",
+                 "--filter", f"label=com.docker.compose.service={service}"]
+        return subprocess.run(words, capture_output=True, text=True, check=False).stdout.strip()
 
     def kill_in_flight(container: str) -> None:
         """Kills the first controller once the recording has 800 of its steps."""

@@ -48,7 +48,7 @@ def pass_on(options: Namespace, *names: str) -> list[str]:
 
 
 def prepare(options: Namespace) -> None:
-    """Judges what can be judged without the programs, then builds them."""
+    """Checks the options that need no program, then builds the programs."""
     if options.view and options.view_port is None:
         options.view_port = "8765"
     if options.in_process:
@@ -107,7 +107,7 @@ def fly(options: Namespace, file: str) -> tuple[int, str]:
 
 
 def print_json(code: int, recording: str) -> None:
-    """What a script asks about a flight: the parts of the manifest that are not about files or the machine."""
+    """Prints the parts of the manifest that are not about files or the machine."""
     try:
         manifest = json.loads((Path(recording) / "manifest.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):

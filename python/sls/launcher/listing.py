@@ -1,4 +1,4 @@
-"""`./sls list`: what a flight can be made of, one line each."""
+"""`./sls list`: scenarios, campaigns, laws and plants, one line each."""
 
 import re
 import shutil

@@ -1,4 +1,4 @@
-"""Runs the programs of a flight: passes signals on, ends all when one fails, and never waits for ever.
+"""Runs the programs of a flight: passes signals on, ends all when one fails, and never waits forever.
 
 Signals are blocked and taken one by one, so none is lost between two steps of the launcher."""
 

@@ -16,7 +16,6 @@
 #include <thread>
 #include <vector>
 
-#include "common/app/stop_signal.hpp"
 #include "common/config/config_error.hpp"
 
 namespace sls::app {
@@ -117,13 +116,6 @@ TEST(RunMainTest, BadUsageIsTwoWithoutWork) {
     EXPECT_TRUE(contains(outcome.err, "--help")) << outcome.err;
     EXPECT_EQ(outcome.out, "");
   }
-}
-
-TEST(RunMainTest, BadUsageNamesTheFlagAndTheRange) {
-  const Outcome outcome = run({"--domain", "233"});
-  EXPECT_TRUE(contains(outcome.err, "--domain")) << outcome.err;
-  EXPECT_TRUE(contains(outcome.err, "233")) << outcome.err;
-  EXPECT_TRUE(contains(outcome.err, "232")) << outcome.err;
 }
 
 TEST(RunMainTest, BadUsageSaysWhatWasExpectedAndWhatCame) {

@@ -8,7 +8,6 @@
 #include <algorithm>
 #include <atomic>
 #include <optional>
-#include <thread>
 
 #include "tests/support/own_domain.hpp"
 #include "tests/support/waiting.hpp"

@@ -6,7 +6,6 @@
 #include <tinyxml2.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <array>
 #include <cstdlib>
 #include <iostream>
@@ -17,6 +16,7 @@
 #include "common/config/config_error.hpp"
 #include "fastdds_files.hpp"
 #include "tests/support/edited_documents.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/own_domain.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -29,12 +29,7 @@ const fs::path kConfig = fs::path(SLS_SOURCE_DIR) / "config";
 
 /// The message of the ConfigError that checking `file` gives, or "no error".
 std::string find_error(const fs::path& file) {
-  try {
-    read_qos_file(file, "tester");
-  } catch (const config::ConfigError& error) {
-    return error.what();
-  }
-  return "no error";
+  return sls::test::find_error<config::ConfigError>([&] { read_qos_file(file, "tester"); });
 }
 
 class QosFileTest : public testing::Test {

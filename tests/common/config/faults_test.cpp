@@ -3,9 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include <fstream>
-
 #include "tests/common/config/support.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::config::faults {
 namespace {
@@ -16,12 +15,7 @@ const Abilities kTool{"tool",
                       {}};
 
 std::string find_error(const std::string& text, const Abilities& abilities = kTool) {
-  try {
-    parse(text, "file", abilities);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "no error";
+  return sls::test::find_error<ConfigError>([&] { parse(text, "file", abilities); });
 }
 /// The error of one fault, on line 2.
 std::string find_error_of(const std::string& fault, const Abilities& abilities = kTool) {
@@ -124,13 +118,8 @@ TEST(FaultsTest, AWordThatAToolDoesNotKnowIsRefused) {
 }
 
 TEST(FaultsTest, AMissingFileIsNamed) {
-  try {
-    load("no_such.yaml", kTool);
-    FAIL();
-  } catch (const ConfigError& error) {
-    EXPECT_STREQ(error.what(),
-                 "no_such.yaml: expected a file of faults, got none (No such file or directory)");
-  }
+  EXPECT_EQ(sls::test::find_error<ConfigError>([] { load("no_such.yaml", kTool); }),
+            "no_such.yaml: expected a file of faults, got none (No such file or directory)");
 }
 
 TEST(FaultsTest, ThePageNamesEveryWord) {

@@ -3,11 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <string>
-#include <vector>
-
-#include "common/config/scenario.hpp"
+#include "tests/common/config/support.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::config {
 namespace {
@@ -16,30 +13,20 @@ using testing::HasSubstr;
 
 const std::filesystem::path kFolder = SLS_SOURCE_DIR "/config/scenarios";
 
-std::vector<std::filesystem::path> list_scenarios() {
-  std::vector<std::filesystem::path> files;
-  for (const auto& entry : std::filesystem::directory_iterator(kFolder))
-    if (entry.path().extension() == ".yaml") files.push_back(entry.path());
-  return files;
-}
-
 std::string find_error(ScenarioDraft draft, const std::string& path, const std::string& value) {
-  try {
+  return sls::test::find_error<ConfigError>([&] {
     draft.set(path, value);
     draft.make_scenario();
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "";
+  });
 }
 
 TEST(ScenarioDraftTest, KeepsEveryValueOfEveryShippedScenario) {
-  for (const auto& file : list_scenarios())
+  for (const auto& file : test::list_yaml_files("config/scenarios"))
     EXPECT_EQ(to_yaml(ScenarioDraft(file).make_scenario()), to_yaml(load_scenario(file))) << file;
 }
 
 TEST(ScenarioDraftTest, WritesATextThatIsTheSameScenario) {
-  for (const auto& file : list_scenarios()) {
+  for (const auto& file : test::list_yaml_files("config/scenarios")) {
     ScenarioDraft draft(file);
     draft.set("vehicle.gravity_m_s2", "9.75");
     const Scenario made = draft.make_scenario();

@@ -1,9 +1,14 @@
 #include "tests/common/config/support.hpp"
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <fstream>
 #include <iterator>
+#include <regex>
 #include <stdexcept>
+
+#include "tests/support/errors.hpp"
 
 namespace sls::config::test {
 const char* const kMinimalScenario =
@@ -157,13 +162,31 @@ mission:
     for_s: 1
 )";
 
+std::string make_autopilot_text(const std::string& autopilot) {
+  return replace_once(kMinimalScenario, "plant:\n",
+                      "autopilot: " + autopilot +
+                          "\n"
+                          "plant:\n"
+                          "  model: multirotor\n"
+                          "  inertia_kg_m2: [0.03, 0.03, 0.06]\n"
+                          "  rotor: { thrust_constant_n_s2: 5.0e-6, max_speed_rad_s: 2000 }\n"
+                          "  rotors: [{ position_m: [0, 0, 0], spin: ccw }]\n");
+}
+
 std::string find_error(const std::string& text) {
-  try {
-    parse_scenario(text, "file");
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "no error";
+  return sls::test::find_error<ConfigError>([&] { parse_scenario(text, "file"); });
+}
+
+void expect_every_key(const std::string& text, const Scenario& expected) {
+  const std::string written = to_yaml(parse_scenario(text, "file"));
+  EXPECT_EQ(to_yaml(parse_scenario(written, "written")), to_yaml(expected));
+  const std::regex key("[a-z_0-9]+:");
+  const auto count = [&](const std::string& in, const std::string& wanted) {
+    return std::count_if(std::sregex_iterator(in.begin(), in.end(), key), {},
+                         [&](const std::smatch& found) { return found.str() == wanted; });
+  };
+  for (std::sregex_iterator at(text.begin(), text.end(), key), end; at != end; ++at)
+    EXPECT_GE(count(written, at->str()), count(text, at->str())) << at->str() << '\n' << written;
 }
 
 std::vector<std::filesystem::path> list_yaml_files(const std::string& folder) {

@@ -12,16 +12,9 @@
 
 namespace sls::config::test {
 
-using control::AxisGains;
-using control::Gains;
-using control::LqrWeights;
 using control::NamedGains;
 using control::QsfKeys;
 using sls::test::replace_once;
-
-inline Gains gains_of(const Scenario& scenario) {
-  return scenario.controller.own.get<QsfKeys>().gains;
-}
 
 /// Equal in every key.
 inline bool are_equal(const Scenario& a, const Scenario& b) { return to_yaml(a) == to_yaml(b); }
@@ -39,7 +32,13 @@ std::string read_text(const std::filesystem::path& file);
 extern const char* const kEveryKey;
 extern const char* const kEveryMultirotorKey;
 
+/// Reads `text`, writes it and reads that: reader and writer must know each key of it, and give
+/// `expected`.
+void expect_every_key(const std::string& text, const Scenario& expected);
+
 /// A short valid scenario, one key per line, in which tests replace parts.
 extern const char* const kMinimalScenario;
+/// The same of a multirotor with the section `autopilot`.
+std::string make_autopilot_text(const std::string& autopilot);
 
 }  // namespace sls::config::test

@@ -4,18 +4,15 @@
 
 #include <random>
 
+#include "tests/support/errors.hpp"
+
 namespace sls::config {
 namespace {
 
 using Ids = std::vector<std::uint32_t>;
 
 std::string find_error(const std::string& text, std::size_t fleet_size = 10) {
-  try {
-    parse_vehicle_ids(text, fleet_size);
-  } catch (const ConfigError& error) {
-    return error.what();
-  }
-  return "no error";
+  return sls::test::find_error<ConfigError>([&] { parse_vehicle_ids(text, fleet_size); });
 }
 
 TEST(VehicleIdsTest, ReadsIdsAndRangesSortedAndEachOnce) {

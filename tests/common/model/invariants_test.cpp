@@ -27,17 +27,6 @@ oracle::State make_start() {
   return state;
 }
 
-TEST(InvariantsTest, EnergyOfAFallIsConserved) {
-  const SlungLoadParameters vehicle = make_vehicle();
-  oracle::State state = make_start();
-  const double start = calc_energy(oracle::to_model_state(state, 0.7), vehicle);
-  for (int i = 0; i < 2000; ++i) {
-    state = oracle::rk4_step(state, Eigen::Vector3d::Zero(), 1e-3, vehicle);
-  }
-  // RK4 at 1 ms, rod at 3 rad/s: relative error (3e-3)⁴ per radian, over 6 rad, of some 40 J.
-  EXPECT_NEAR(calc_energy(oracle::to_model_state(state, 0.7), vehicle), start, 1e-8);
-}
-
 TEST(InvariantsTest, EnergyGrowsByTheWorkOfTheForce) {
   const SlungLoadParameters vehicle = make_vehicle();
   const Eigen::Vector3d force(3.0, -2.0, -20.0);
@@ -47,6 +36,7 @@ TEST(InvariantsTest, EnergyGrowsByTheWorkOfTheForce) {
   // A constant force does the work F · Δp.
   const double gain = calc_energy(oracle::to_model_state(state, 0.7), vehicle) -
                       calc_energy(oracle::to_model_state(start, 0.7), vehicle);
+  // RK4 at 1 ms, rod at 3 rad/s: relative error (3e-3)⁴ per radian, over 3 rad, of some 40 J.
   EXPECT_NEAR(gain, force.dot(state.p_WQ - start.p_WQ), 1e-8);
 }
 

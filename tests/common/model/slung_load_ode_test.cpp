@@ -42,22 +42,6 @@ TEST(SlungLoadOdeTest, ObeysNewtonsLawsAndTheRodConstraint) {
   }
 }
 
-TEST(SlungLoadOdeTest, SwingsAboutHoverAtTheClosedFormFrequency) {
-  // ω² = (m + m_L) g / (m L) for a small swing at F = −(m + m_L) g e₃.
-  const model::SlungLoadParameters vehicle = make_vehicle();
-  const double omega = std::sqrt(1.7 * 9.81 / (1.3 * 0.7));
-  const double amplitude = 1e-4;
-  State state;
-  state.n_W = Eigen::Vector3d(amplitude, 0.0, 1.0).normalized();
-  const int steps = 1000;
-  const double h = 2.0 * 3.14159265358979323846 / omega / steps;
-  const Eigen::Vector3d hover(0.0, 0.0, -1.7 * 9.81);
-  for (int i = 0; i < steps; ++i) state = rk4_step(state, hover, h, vehicle);
-  // After one period the rod is back; the finite amplitude lengthens the period by 1e-8 / 16.
-  EXPECT_NEAR(state.n_W.x(), amplitude, 1e-11);
-  EXPECT_NEAR(state.n_dot_W.x(), 0.0, 1e-10 * omega);
-}
-
 TEST(SlungLoadOdeTest, CirclesAsAConicalPendulum) {
   // Ω² = (m + m_L) g / (m L cos θ): under the hover force the rod keeps its angle θ and turns, and
   // the quadrotor circles opposite to the load about their centre of mass.

@@ -14,6 +14,7 @@
 #include "common/config/config_error.hpp"
 #include "common/text/sha256.hpp"
 #include "tests/common/plugin/misbehaviour.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::plugin {
@@ -25,23 +26,16 @@ const std::string kFolder = SLS_LIBRARIES "/";
 
 /// The error of loading `file` and finding `symbol` in it, or "no error".
 std::string find_error(const std::string& file, const char* symbol = "sls_controller") {
-  try {
-    SharedLibrary(file, "flight.yaml:7: controller.law").find(symbol);
-  } catch (const config::ConfigError& error) {
-    return error.what();
-  }
-  return "no error";
+  return sls::test::find_error<config::ConfigError>(
+      [&] { SharedLibrary(file, "flight.yaml:7: controller.law").find(symbol); });
 }
 
 /// The message of the exception that the call of `work` throws, or "no error".
 template <class Work>
 std::string find_call_error(const Work& work) {
-  try {
+  return sls::test::find_error<std::runtime_error>([&] {
     call_guarded({"./mine.so", "answer", 3, 41}, work);
-  } catch (const std::runtime_error& error) {
-    return error.what();
-  }
-  return "no error";
+  });
 }
 
 std::string expected(const std::string& file, const std::string& message) {

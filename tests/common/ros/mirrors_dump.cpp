@@ -1,7 +1,6 @@
 /// Mirrors a made-up flight of the vehicles 0 and 3 for tests with other libraries. It prints lines
 /// of JSON: the channels, then each sample (frame W, z down) and its messages (CDR in hexadecimal).
 #include <Eigen/Geometry>
-#include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
 

@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <map>
 #include <stdexcept>
 
 #include "common/ros/markers.hpp"

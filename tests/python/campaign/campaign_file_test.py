@@ -9,6 +9,7 @@ import textwrap
 import campaign_support as support
 import pytest
 import yaml
+from places import ROOT
 
 from sls.campaign.campaign import Certify, Keep
 from sls.campaign.campaign_file import load_campaign
@@ -93,7 +94,7 @@ period_s: 0.002
 
 
 def test_the_examples_of_the_readme_are_campaigns(tmp_path):
-    readme = support.HERE.parents[2] / "config" / "campaigns" / "README.md"
+    readme = ROOT / "config/campaigns/README.md"
     blocks = re.findall(r"(?:^    .*\n)+", readme.read_text(), re.MULTILINE)
     first, *others = [textwrap.dedent(block) for block in blocks]
     scenarios = readme.parents[1] / "scenarios"

@@ -1,10 +1,10 @@
 """Shared by the tests of campaign files."""
 
-import sys
 from pathlib import Path
 
+from sls.campaign.campaign_file import load_campaign
+
 HERE = Path(__file__).resolve().parent
-sys.path.insert(0, str(HERE.parents[2] / "python"))
 
 
 def write_campaign(folder, text, name="campaign.yaml"):
@@ -15,5 +15,4 @@ def write_campaign(folder, text, name="campaign.yaml"):
 
 
 def make_campaign(folder, text, name="campaign.yaml"):
-    from sls.campaign.campaign_file import load_campaign
     return load_campaign(write_campaign(folder, text, name))

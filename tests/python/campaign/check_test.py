@@ -61,6 +61,7 @@ vary:
     ("vary:\n  controller.saturate: { list: [true, false, text] }\n",
      "3: vary.controller.saturate: run 2: expected true or false, got \"text\""),
     ("vary:\n  faults.0.noise.position_m.1: { grid: [0, 0.1, 3] }\n", ""),
+    ("vary:\n  vehicles: { list: [1, 2] }\n", "3: vary.vehicles: run 1: expected 1, as in the base scenario, got 2"),
     ("vary:\n  controller.law: { list: [qsf, text] }\n", "3: vary.controller.law: run 1: "
      "expected cooperative, pid, qsf or a shared library (a path ending in .so), got \"text\""),
     ("vary:\n  faults.7.delay.by_s: { list: [0.004] }\n",

@@ -3,7 +3,6 @@
 import math
 import pickle
 
-import campaign_support  # noqa: F401
 import pytest
 
 from sls.campaign.expressions import Expression, ExpressionError

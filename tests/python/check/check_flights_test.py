@@ -13,13 +13,12 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
+from places import BUILD, ROOT
 
 import sls.check.flights
 import sls.report
 from sls.check.cli import main
 
-ROOT = Path(__file__).resolve().parents[3]
-BUILD = Path(os.environ.get("SLS_BUILD", ROOT / "build"))
 LAW = """
 import ctypes, time
 def law(now):
@@ -81,9 +80,7 @@ def impatient(monkeypatch):
 
 def start(folder, *words):
     return subprocess.Popen([sys.executable, "-BP", "-m", "sls.check", *words], cwd=folder, text=True,
-                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-                            env={**os.environ, "SLS_BUILD": str(BUILD),
-                                 "PYTHONPATH": f"{ROOT}/python:{BUILD}/python"})
+                            stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
 
 
 # --- placements -----------------------------------------------------------------------------------

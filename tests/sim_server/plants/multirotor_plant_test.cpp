@@ -481,7 +481,7 @@ TEST(MultirotorPlantTest, StepsInAttitudeAsFastAsThePublishedVehicle) {
     int steps = 0;
     for (; steps < 1000 && calc_angle() < (1.0 - std::exp(-1.0)) * step_rad; ++steps)
       plant.advance({tilted}, 1);
-    EXPECT_NEAR(steps * kStep, 0.17, 0.02);  // design, section 11
+    EXPECT_NEAR(steps * kStep, 0.17, 0.02);  // docs/study.md, The attitude loop
     plant.advance({tilted}, 2000);
     EXPECT_NEAR(calc_angle(), step_rad, 0.02 * step_rad);
   }

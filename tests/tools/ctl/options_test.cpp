@@ -66,13 +66,10 @@ TEST(OperatorOptionsTest, TheDefaultsAreTheDocumentedOnes) {
   EXPECT_EQ(options.timeout_s, 10.0);
 }
 
-TEST(OperatorOptionsTest, AnUnknownCommandIsRefused) {
+TEST(OperatorOptionsTest, AnUnknownCommandIsRefusedAndNamed) {
   for (const char* line :
        {"", "halt", "pause resume", "pause --watch", "status pause", "step", "step 3 4", "pause 3"})
     EXPECT_NE(find_error(line), "no error") << line;
-}
-
-TEST(OperatorOptionsTest, MistakesAreNamed) {
   EXPECT_NE(find_error("halt").find("halt"), std::string::npos) << find_error("halt");
   EXPECT_NE(find_error("").find("pause, step, "), std::string::npos) << find_error("");
   EXPECT_EQ(find_error("step 0"), "N: expected a whole number, at least 1, got 0");

@@ -116,8 +116,8 @@ TEST(DiagnosisTest, TwoUsersShareNoMemory) {
 
 TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNoFault) {
   Observations seen = make_healthy();
-  Heard heard{5, seen.peer_address, {{}, "sim_server", false}};
-  seen.heard = {heard};
+  seen.heard = {{5, seen.peer_address, {}}};
+  seen.heard.front().announcement.name = "sim_server";
   EXPECT_EQ(list_findings(seen), Names{});
   for (const char* name : {"recorder", "control_client", "sls_view"}) {
     seen.heard.front().announcement.name = name;

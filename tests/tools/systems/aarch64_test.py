@@ -14,7 +14,7 @@ from pathlib import Path
 from unittest import mock
 
 ROOT = Path(__file__).resolve().parents[3]
-BUILD = Path(sys.argv.pop(1)).resolve() if len(sys.argv) > 1 else ROOT / "build"
+BUILD = Path(os.environ["SLS_BUILD"])
 sys.path.insert(0, str(ROOT / "tools/systems"))
 import aarch64  # noqa: E402
 import results  # noqa: E402

@@ -11,7 +11,7 @@ import unittest.mock
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-BUILD = Path(sys.argv.pop(1)).resolve() if len(sys.argv) > 1 else ROOT / "build"
+BUILD = Path(os.environ["SLS_BUILD"])
 sys.path.insert(0, str(ROOT / "tools/systems"))
 import certificates  # noqa: E402
 
@@ -107,7 +107,3 @@ class ProgramTest(unittest.TestCase):
         self.assertEqual(ended.returncode, 0, ended.stdout + ended.stderr)
         rows = [re.findall(r"\b[0-9a-f]{8}\b", line) for line in ended.stdout.splitlines()]
         self.assertEqual([(len(row), len(set(row))) for row in rows if row], [(3, 1)] * 3, ended.stdout)
-
-
-if __name__ == "__main__":
-    unittest.main(verbosity=2)

@@ -1,7 +1,6 @@
 """`./sls systems` in small: a small checkout, and a stand-in for debootstrap that fills a tree with programs of this
 machine. The commands in the tree, the limits, the cleaning up and the namespaces are real. Needs root and namespaces."""
 
-import json
 import os
 import pathlib
 import re

@@ -29,8 +29,8 @@ std::vector<std::uint32_t> list_vehicles(const Parameters& parameters) {
 
 }  // namespace
 
-Hub::Hub(std::unique_ptr<FlightSource> source, Clock clock)
-    : source_(std::move(source)), clock_(std::move(clock)) {
+Hub::Hub(Feed& feed, Operator& requests, Clock clock)
+    : feed_(feed), requests_(requests), clock_(std::move(clock)) {
   add_native_channels();
 }
 
@@ -38,8 +38,8 @@ Hub::Hub(std::unique_ptr<FlightSource> source, Clock clock)
 
 void Hub::add(Client& client) {
   if (clients_.empty()) {
-    source_->add(*this);
-    for (const TopicId topic : kClockTopics) source_->want(topic);
+    feed_.add(*this);
+    for (const TopicId topic : kClockTopics) feed_.want(topic);
   }
   clients_[&client].dropped = client.connection().dropped();
   greet(client);
@@ -72,8 +72,8 @@ void Hub::remove(Client& client) {
   }
   clients_.erase(&client);
   if (!clients_.empty()) return;
-  for (const TopicId topic : kClockTopics) source_->unwant(topic);
-  source_->remove(*this);
+  for (const TopicId topic : kClockTopics) feed_.unwant(topic);
+  feed_.remove(*this);
   events_.clear();  // the source sends them again to a new listener
 }
 
@@ -110,7 +110,7 @@ bool Hub::unsubscribe(Client& client, std::uint32_t subscription_id) {
 
 void Hub::note_wanted(const OpenChannel& channel, bool is_wanted) {
   if (channel.topic)
-    is_wanted ? source_->want(*channel.topic) : source_->unwant(*channel.topic);
+    is_wanted ? feed_.want(*channel.topic) : feed_.unwant(*channel.topic);
   else
     is_wanted ? ++subscribed_mirrors_ : --subscribed_mirrors_;
 }
@@ -123,8 +123,7 @@ void Hub::send_kept(const OpenChannel& channel, const Subscriber& subscriber) {
   };
   for (const Kept& kept : channel.kept) send(kept.time_ns, kept.cdr);
   if (!channel.topic || !is_latched(*channel.topic)) return;
-  for (const Sample& sample : source_->latched(*channel.topic))
-    send(find_time(sample), *sample.cdr);
+  for (const Sample& sample : feed_.latched(*channel.topic)) send(find_time(sample), *sample.cdr);
 }
 
 // --- channels ------------------------------------------------------------------------------------
@@ -233,16 +232,16 @@ void Hub::begin_run(const RunView& run) {
   if (run.run.status) advance(calc_sim_time(run.run.status->step(), period_ns_));
 }
 
-void Hub::note_event(std::uint64_t run_id, std::uint64_t step, const std::string& text) {
+void Hub::note_event(const RunEvent& event) {
   const std::string where =
-      run_id_ == run_id && period_ns_ > 0
-          ? fmt::format("{:.3f} s", static_cast<double>(calc_sim_time(step, period_ns_)) * 1e-9)
-          : fmt::format("step {}", step);
-  const Payload payload = make_status(StatusLevel::kInfo, where + ": " + text);
+      run_id_ == event.run_id && period_ns_ > 0
+          ? fmt::format("{:.3f} s",
+                        static_cast<double>(calc_sim_time(event.step, period_ns_)) * 1e-9)
+          : fmt::format("step {}", event.step);
+  const Payload payload = make_status(StatusLevel::kInfo, where + ": " + event.text);
   events_.push_back(payload);
   if (events_.size() > kMostEvents) events_.pop_front();
-  for (const auto& [client, seen] : clients_)
-    client->connection().send(MessageKind::kText, payload, Delivery::kAlways);
+  send_all(payload);
 }
 
 void Hub::note_silence(const RunView& run) {
@@ -325,11 +324,12 @@ void Hub::advance(std::int64_t time_ns) {
 
 // --- status messages -----------------------------------------------------------------------------
 
-void Hub::say(StatusLevel level, const std::string& text) {
-  const Payload payload = make_status(level, text);
+void Hub::send_all(const Payload& text) {
   for (const auto& [client, seen] : clients_)
-    client->connection().send(MessageKind::kText, payload, Delivery::kAlways);
+    client->connection().send(MessageKind::kText, text, Delivery::kAlways);
 }
+
+void Hub::say(StatusLevel level, const std::string& text) { send_all(make_status(level, text)); }
 
 void Hub::say_dropped() {
   const auto now = clock_();

@@ -7,7 +7,6 @@
 #include <deque>
 #include <functional>
 #include <map>
-#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -19,22 +18,6 @@
 #include "tools/view/live/operator.hpp"
 
 namespace sls::view::foxglove {
-
-/// Interface of Feed and Operator for sessions; tests implement their own.
-class FlightSource {
- public:
-  virtual ~FlightSource() = default;
-  /// The same functions as in Feed.
-  virtual void add(Feed::Listener& listener) = 0;
-  virtual void remove(Feed::Listener& listener) = 0;
-  virtual void want(TopicId topic) = 0;
-  virtual void unwant(TopicId topic) = 0;
-  virtual std::vector<Sample> latched(TopicId topic) const = 0;
-  /// The same functions as in Operator.
-  virtual bool may_ask() const = 0;
-  virtual void request(ControlAction action, std::uint64_t steps,
-                       std::function<void(const OperatorReply&)> done) = 0;
-};
 
 /// Interface of a session for the hub.
 class Client {
@@ -50,8 +33,8 @@ class Hub final : public Feed::Listener {
  public:
   using Clock = std::function<std::chrono::steady_clock::time_point()>;
 
-  /// `source` must outlive the hub.
-  explicit Hub(std::unique_ptr<FlightSource> source, Clock clock = std::chrono::steady_clock::now);
+  /// Feed and operator must outlive the hub.
+  Hub(Feed& feed, Operator& requests, Clock clock = std::chrono::steady_clock::now);
 
   /// Sends a new client the server, the channels, the status and the past events.
   void add(Client& client);
@@ -61,11 +44,11 @@ class Hub final : public Feed::Listener {
   /// False if there is no such subscription.
   bool unsubscribe(Client& client, std::uint32_t subscription_id);
 
-  FlightSource& source() { return *source_; }
+  Operator& requests() { return requests_; }
 
   void note(const Sample& sample) override;
   void note(const RunView* run) override;
-  void note_event(std::uint64_t run_id, std::uint64_t step, const std::string& text) override;
+  void note_event(const RunEvent& event) override;
 
  private:
   struct Subscriber {
@@ -79,7 +62,6 @@ class Hub final : public Feed::Listener {
   struct OpenChannel {
     Channel channel;
     std::optional<TopicId> topic;  ///< none: a mirror
-    bool is_latched = false;
     std::vector<Subscriber> subscribers;
     std::vector<Kept> kept;  ///< messages of a latched mirror
   };
@@ -100,12 +82,14 @@ class Hub final : public Feed::Listener {
   void emit_static_mirrors();
   std::int64_t find_time(const Sample& sample);
   void advance(std::int64_t time_ns);
+  void send_all(const Payload& text);
   void say(StatusLevel level, const std::string& text);
   void say_dropped();
   void note_silence(const RunView& run);
   std::string session_id() const;
 
-  std::unique_ptr<FlightSource> source_;
+  Feed& feed_;
+  Operator& requests_;
   const Clock clock_;
   std::map<std::uint32_t, OpenChannel> channels_;  // by id
   std::vector<OpenChannel*> natives_;              // by TopicId

@@ -18,11 +18,6 @@ constexpr char kMessageData = 1, kTime = 2, kServiceCallResponse = 3;  // from t
 constexpr char kClientMessageData = 1, kServiceCallRequest = 2;        // from a client
 constexpr const char* kJson = "json";
 
-Payload to_payload(const Json& json) {
-  return std::make_shared<const std::string>(
-      json.dump(-1, ' ', false, Json::error_handler_t::replace));
-}
-
 template <class Number>
 void append(std::string& bytes, Number number) {
   for (std::size_t i = 0; i < sizeof number; ++i)

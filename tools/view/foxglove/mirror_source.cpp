@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "common/bus/convert.hpp"
 #include "tools/view/foxglove/sample_stamp.hpp"
+#include "tools/view/live/vehicle_sample.hpp"
 
 namespace sls::view::foxglove {
 
@@ -14,9 +14,6 @@ constexpr std::int64_t kMostAtOnce = 4;
 
 /// Entries that hold a state; late answers come without one.
 bool has_state(const RecordEntry& entry) { return entry.kind() != AnswerKind::ANSWER_LATE; }
-
-/// Only an accepted answer has the desired position of the load at the entry's step.
-bool has_reference(const RecordEntry& entry) { return entry.kind() == AnswerKind::ANSWER_ACCEPTED; }
 
 }  // namespace
 
@@ -55,26 +52,11 @@ void MirrorSource::note(const RecordBatch& batch, Time now,
     vehicle.paid_until += static_cast<std::int64_t>(count) * kSpacing;
   }
   std::sort(chosen.begin(), chosen.end());  // by step, so that the clock never goes back
-  for (const std::size_t i : chosen) emit(batch.entries()[i], emit_message);
-}
-
-void MirrorSource::emit(const RecordEntry& entry, const ros::Mirrors::Emit& emit_message) {
-  const PlantState& truth = entry.truth();
-  const std::array<double, 4>& q_WB = truth.q_WB();
-  ros::VehicleSample sample;
-  sample.vehicle_id = entry.vehicle_id();
-  sample.step = entry.step();
-  sample.sim_time_ns = calc_sim_time(entry.step(), period_ns_);
-  sample.p_WQ = bus::to_vector(truth.p_WQ_m());
-  sample.v_WQ = bus::to_vector(truth.v_WQ_m_s());
-  sample.q_WB = Eigen::Quaterniond(q_WB[0], q_WB[1], q_WB[2], q_WB[3]);
-  sample.w_WB_B = bus::to_vector(truth.w_WB_B_rad_s());
-  sample.p_WL = bus::to_vector(truth.p_WL_m());
-  sample.v_WL = bus::to_vector(truth.v_WL_m_s());
-  sample.signals = truth.signals();
-  if (has_reference(entry))
-    sample.reference = bus::to_vector(entry.answer().reference().position_m());
-  mirrors_.emit(sample, emit_message);
+  for (const std::size_t i : chosen) {
+    const RecordEntry& entry = batch.entries()[i];
+    mirrors_.emit(make_vehicle_sample(entry, calc_sim_time(entry.step(), period_ns_)),
+                  emit_message);
+  }
 }
 
 }  // namespace sls::view::foxglove

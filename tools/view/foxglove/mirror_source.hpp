@@ -35,8 +35,6 @@ class MirrorSource {
     std::uint64_t next_step = 0;
   };
 
-  void emit(const RecordEntry& entry, const ros::Mirrors::Emit& emit);
-
   const std::int64_t period_ns_;
   ros::Mirrors mirrors_;
   std::map<std::uint32_t, Vehicle> vehicles_;

@@ -18,10 +18,6 @@ constexpr std::array<Service, 6> kServices = {{{1, "/sls/start", ControlAction::
                                                {5, "/sls/reset", ControlAction::ACTION_RESET},
                                                {6, "/sls/stop", ControlAction::ACTION_STOP}}};
 
-std::string dump(const Json& json) {
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
 Json make_part(const std::string& schema_name, const Json& properties) {
   const Json schema = {{"title", schema_name}, {"type", "object"}, {"properties", properties}};
   return {{"encoding", "json"},
@@ -56,8 +52,7 @@ const Service* find_service(std::uint32_t id) {
 Payload make_advertise_services() {
   Json services = Json::array();
   for (const Service& service : kServices) services.push_back(make_service(service));
-  return std::make_shared<const std::string>(
-      dump({{"op", "advertiseServices"}, {"services", std::move(services)}}));
+  return to_payload({{"op", "advertiseServices"}, {"services", std::move(services)}});
 }
 
 std::variant<std::uint64_t, Malformed> parse_request(const Service& service,

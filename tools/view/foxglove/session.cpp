@@ -20,7 +20,7 @@ FoxgloveSession::FoxgloveSession(std::shared_ptr<Hub> hub, Connection& connectio
 FoxgloveSession::~FoxgloveSession() { hub_->remove(*this); }
 
 bool FoxgloveSession::may_call() const {
-  return connection_.may_operate() && hub_->source().may_ask();
+  return connection_.may_operate() && hub_->requests().may_ask();
 }
 
 void FoxgloveSession::forget(std::uint32_t subscription_id) {
@@ -66,7 +66,7 @@ void FoxgloveSession::call(const ServiceCall& call) {
   if (!service) return refuse(fmt::format("there is no service {}", call.service_id));
   if (!connection_.may_operate())
     return refuse(fmt::format("{}: not allowed: {}", service->name, connection_.why_not()));
-  if (!hub_->source().may_ask())
+  if (!hub_->requests().may_ask())
     return refuse(fmt::format("{}: not allowed: the keys of this viewer are not an operator's",
                               service->name));
   if (call.encoding != "json")
@@ -74,12 +74,12 @@ void FoxgloveSession::call(const ServiceCall& call) {
         fmt::format("{}: encoding: expected json, got {}", service->name, quote(call.encoding)));
   const auto steps = parse_request(*service, call.data);
   if (const auto* malformed = std::get_if<Malformed>(&steps)) return refuse(malformed->text);
-  hub_->source().request(service->action, std::get<std::uint64_t>(steps),
-                         [session = std::weak_ptr<FoxgloveSession*>(self_), service,
-                          id = call.call_id](const OperatorReply& reply) {
-                           const auto alive = session.lock();
-                           if (alive) (*alive)->answer(*service, id, reply);
-                         });
+  hub_->requests().request(service->action, std::get<std::uint64_t>(steps),
+                           [session = std::weak_ptr<FoxgloveSession*>(self_), service,
+                            id = call.call_id](const OperatorReply& reply) {
+                             const auto alive = session.lock();
+                             if (alive) (*alive)->answer(*service, id, reply);
+                           });
 }
 
 void FoxgloveSession::answer(const Service& service, std::uint32_t call_id,
@@ -110,3 +110,14 @@ void FoxgloveSession::send_text(Payload text) {
 }
 
 }  // namespace sls::view::foxglove
+
+namespace sls::view {
+
+Protocol make_foxglove_protocol(Feed& feed, Operator& requests) {
+  const auto hub = std::make_shared<foxglove::Hub>(feed, requests);
+  return {{"foxglove.sdk.v1", "foxglove.websocket.v1"}, [hub](Connection& connection) {
+            return std::make_unique<foxglove::FoxgloveSession>(hub, connection);
+          }};
+}
+
+}  // namespace sls::view

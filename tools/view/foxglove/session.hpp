@@ -1,4 +1,5 @@
-/// One client of the Foxglove protocol.
+/// Sessions of Foxglove, Lichtblick and other clients of the Foxglove WebSocket protocol.
+/// Source: https://github.com/foxglove/ws-protocol/blob/main/docs/spec.md
 #pragma once
 
 #include <cstdint>
@@ -52,3 +53,10 @@ class FoxgloveSession final : public Session, public Client {
 };
 
 }  // namespace sls::view::foxglove
+
+namespace sls::view {
+
+/// Feed and operator must outlive the sessions.
+Protocol make_foxglove_protocol(Feed& feed, Operator& requests);
+
+}  // namespace sls::view

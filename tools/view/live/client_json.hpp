@@ -1,9 +1,12 @@
-/// JSON from a client, at a cost that grows with its length only.
+/// JSON from a client, at a cost that grows with its length only, and to one.
 #pragma once
 
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <string_view>
 #include <vector>
+
+#include "tools/view/web/connection.hpp"
 
 namespace sls::view {
 
@@ -24,6 +27,14 @@ inline nlohmann::json parse_client_json(std::string_view text) {
   };
   nlohmann::json parsed = nlohmann::json::parse(text, judge, false);
   return has_too_many ? nlohmann::json(nlohmann::json::value_t::discarded) : parsed;
+}
+
+/// Replaces bytes that are not UTF-8: texts come from the network.
+inline std::string dump(const nlohmann::ordered_json& json) {
+  return json.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
+}
+inline Payload to_payload(const nlohmann::ordered_json& json) {
+  return std::make_shared<const std::string>(dump(json));
 }
 
 }  // namespace sls::view

@@ -64,42 +64,33 @@ template <class Message>
 class TopicReader : public AnyTopicReader {
  public:
   /// `may_rest`: true while no listener requires every sample of sls/record.
-  TopicReader(bus::Node& node, TopicId topic, const Put& put, const std::atomic<bool>& may_rest)
-      : reader_(node, is_latched(topic) ? bus::kLatchedReaderProfile : bus::kLoopReaderProfile,
-                [this, topic, &put, &may_rest](std::vector<std::uint8_t>& cdr,
-                                               const bus::PeerId& sender) {
-                  if (topic == TopicId::kRecord && may_rest) rests_.rest_if_busy();
-                  put({topic, std::make_shared<const std::vector<std::uint8_t>>(std::move(cdr)),
+  TopicReader(bus::Node& node, const Put& put, const std::atomic<bool>& may_rest)
+      : reader_(node, is_latched(kTopic) ? bus::kLatchedReaderProfile : bus::kLoopReaderProfile,
+                [this, &put, &may_rest](std::vector<std::uint8_t>& cdr, const bus::PeerId& sender) {
+                  if (kTopic == TopicId::kRecord && may_rest) rests_.rest_if_busy();
+                  put({kTopic, std::make_shared<const std::vector<std::uint8_t>>(std::move(cdr)),
                        to_ns(reader_.written()), sender});
                 }) {}
 
  private:
+  static constexpr TopicId kTopic = bus::Topic<Message>::kId;
+
   Rests rests_;
   bus::RawReader<Message> reader_;  // last: it uses the member above
 };
 
-std::unique_ptr<AnyTopicReader> make_reader(bus::Node& node, TopicId topic, const Put& put,
+template <class Message>
+std::unique_ptr<AnyTopicReader> make_reader(bus::Node& node, const Put& put,
                                             const std::atomic<bool>& may_rest) {
-  switch (topic) {
-    case TopicId::kState:
-      return std::make_unique<TopicReader<States>>(node, topic, put, may_rest);
-    case TopicId::kCommand:
-      return std::make_unique<TopicReader<Commands>>(node, topic, put, may_rest);
-    case TopicId::kRecord:
-      return std::make_unique<TopicReader<RecordBatch>>(node, topic, put, may_rest);
-    case TopicId::kParticipant:
-      return std::make_unique<TopicReader<Participant>>(node, topic, put, may_rest);
-    case TopicId::kParameters:
-      return std::make_unique<TopicReader<Parameters>>(node, topic, put, may_rest);
-    case TopicId::kStatus:
-      return std::make_unique<TopicReader<SimStatus>>(node, topic, put, may_rest);
-    case TopicId::kControl:
-      return std::make_unique<TopicReader<SimControl>>(node, topic, put, may_rest);
-    case TopicId::kControlReply:
-      return std::make_unique<TopicReader<SimControlReply>>(node, topic, put, may_rest);
-  }
-  return nullptr;
+  return std::make_unique<TopicReader<Message>>(node, put, may_rest);
 }
+
+/// By TopicId.
+constexpr std::array kMakeReader = {make_reader<States>,      make_reader<Commands>,
+                                    make_reader<RecordBatch>, make_reader<Participant>,
+                                    make_reader<Parameters>,  make_reader<SimStatus>,
+                                    make_reader<SimControl>,  make_reader<SimControlReply>};
+static_assert(kMakeReader.size() == kTopics);
 
 }  // namespace
 
@@ -226,8 +217,7 @@ struct Feed::Impl {
   void note_event(const RunEvent& event) {
     past_events.push_back(event);
     if (past_events.size() > kPastEvents) past_events.pop_front();
-    for_each(
-        [&](Listener& listener) { listener.note_event(event.run_id, event.step, event.text); });
+    for_each([&](Listener& listener) { listener.note_event(event); });
   }
 
   bool is_read(TopicId topic) const {
@@ -248,7 +238,7 @@ struct Feed::Impl {
     if (!is_read(topic))
       reader.reset();
     else if (!reader)
-      reader = make_reader(node, topic, put_sample, may_rest);
+      reader = kMakeReader[static_cast<std::size_t>(topic)](node, put_sample, may_rest);
   }
 
   bus::Node& node;
@@ -275,14 +265,14 @@ struct Feed::Impl {
 
 Feed::Feed(bus::Node& node, std::uint32_t vehicle_id, Post post)
     : impl_(std::make_unique<Impl>(node, vehicle_id, std::move(post))) {}
+Feed::Feed() = default;
 Feed::~Feed() = default;
 
 void Feed::add(Listener& listener) {
   impl_->listeners.push_back(&listener);
   impl_->update_reader(TopicId::kRecord);
   listener.note(impl_->view.get());
-  for (const RunEvent& event : impl_->past_events)
-    listener.note_event(event.run_id, event.step, event.text);
+  for (const RunEvent& event : impl_->past_events) listener.note_event(event);
 }
 
 void Feed::remove(Listener& listener) {

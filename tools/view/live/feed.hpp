@@ -25,7 +25,7 @@ const char* type_of(TopicId topic);  ///< "sls::States"
 
 /// True for the topics whose samples are rare and must reach a late joiner. They are never dropped,
 /// except in a flood.
-inline bool is_latched(TopicId topic) {
+constexpr bool is_latched(TopicId topic) {
   return topic != TopicId::kState && topic != TopicId::kCommand && topic != TopicId::kRecord;
 }
 
@@ -47,6 +47,13 @@ struct RunView {
   bool is_gone = false;  ///< its server has left
 };
 
+/// An event of a run: a new reason in its status.
+struct RunEvent {
+  std::uint64_t run_id = 0;
+  std::uint64_t step = 0;
+  std::string text;
+};
+
 /// Reads the domain best-effort and passes the samples to listeners on the server's thread, in
 /// batches. The first sample after a pause is passed at once, then at most 60 batches a second, 20
 /// in lockstep. Reads the latched topics always, sls/record while there is a listener, sls/state
@@ -61,7 +68,7 @@ class Feed {
 
   /// `post`: Server::post.
   Feed(bus::Node& node, std::uint32_t vehicle_id, Post post);
-  ~Feed();
+  virtual ~Feed();
 
   struct Listener {
     virtual ~Listener() = default;
@@ -73,23 +80,25 @@ class Feed {
     virtual void end_batch() {}
     /// The run, its status or its participants have changed; null: there is none.
     virtual void note(const RunView* /*run*/) {}
-    virtual void note_event(std::uint64_t /*run_id*/, std::uint64_t /*step*/,
-                            const std::string& /*text*/) {}
+    virtual void note_event(const RunEvent& /*event*/) {}
   };
   /// Call all these functions on the server's thread. A new listener gets the run and the past
   /// events at once.
-  void add(Listener& listener);
-  void remove(Listener& listener);
+  virtual void add(Listener& listener);
+  virtual void remove(Listener& listener);
   /// Counted: the topic is read until `unwant` has been called as often. No effect on topics that
   /// are always read.
-  void want(TopicId topic);
-  void unwant(TopicId topic);
+  virtual void want(TopicId topic);
+  virtual void unwant(TopicId topic);
   /// The current run.
   const RunView* run() const;
   /// The last samples of a latched topic, for late subscribers.
-  std::vector<Sample> latched(TopicId topic) const;
+  virtual std::vector<Sample> latched(TopicId topic) const;
   /// Samples dropped so far because the server's thread was behind.
   std::uint64_t dropped() const;
+
+ protected:
+  Feed();  ///< of a test's own, which overrides what it needs
 
  private:
   struct Impl;

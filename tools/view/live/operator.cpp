@@ -125,6 +125,7 @@ struct Operator::Impl {
 
 Operator::Operator(bus::Node& node, std::uint32_t vehicle_id, Feed::Post post, bool may_ask)
     : impl_(std::make_unique<Impl>(node, vehicle_id, std::move(post), may_ask)) {}
+Operator::Operator() = default;
 Operator::~Operator() = default;
 
 bool Operator::may_ask() const { return impl_->may_ask; }

@@ -23,14 +23,17 @@ class Operator {
  public:
   /// `may_ask`: false if the keys of the secured domain are not an operator's.
   Operator(bus::Node& node, std::uint32_t vehicle_id, Feed::Post post, bool may_ask);
-  ~Operator();
+  virtual ~Operator();
 
-  bool may_ask() const;
+  virtual bool may_ask() const;
   /// Sends a request to the vehicle's run and calls `done` once, on the server's thread, unless
   /// this object has been destroyed. At most 8 requests wait; further ones are refused. The
   /// destructor does not wait for replies.
-  void request(ControlAction action, std::uint64_t steps,
-               std::function<void(const OperatorReply&)> done);
+  virtual void request(ControlAction action, std::uint64_t steps,
+                       std::function<void(const OperatorReply&)> done);
+
+ protected:
+  Operator();  ///< of a test's own, which overrides all
 
  private:
   struct Impl;

@@ -30,12 +30,6 @@ constexpr int kMostMistakes = 8;
 constexpr std::uint64_t kMostId = std::uint64_t{1} << 53;  // integers that JavaScript holds exactly
 constexpr std::uint16_t kPolicyViolation = 1008;
 
-/// Replaces bytes that are not UTF-8: texts come from the network.
-Payload to_payload(const Json& json) {
-  return std::make_shared<const std::string>(
-      json.dump(-1, ' ', false, Json::error_handler_t::replace));
-}
-
 std::string to_hex(std::uint64_t run_id) { return fmt::format("{:016x}", run_id); }
 
 // --- status --------------------------------------------------------------------------------------
@@ -108,7 +102,7 @@ class PageHub : public Feed::Listener {
       frames_.add(sample);
   }
   void note(const RunView* view) override;
-  void note_event(std::uint64_t run_id, std::uint64_t step, const std::string& text) override;
+  void note_event(const RunEvent& event) override;
   void end_batch() override;
 
   const PageOptions& options() const { return options_; }
@@ -119,13 +113,7 @@ class PageHub : public Feed::Listener {
   }
 
  private:
-  struct Event {
-    std::uint64_t run_id;
-    std::uint64_t step;
-    std::string text;
-  };
-
-  Payload make_message(const Event& event) const;
+  Payload make_message(const RunEvent& event) const;
   void start_run(const Parameters& parameters);
   void send_status(const RunView& view);
   void note_stage();
@@ -144,7 +132,7 @@ class PageHub : public Feed::Listener {
   Payload run_message_;     // run, or no_run
   Payload status_message_;  // null: none yet
   std::string stage_;       // the last one flown
-  std::deque<Event> events_;
+  std::deque<RunEvent> events_;
 };
 
 // --- one page ------------------------------------------------------------------------------------
@@ -310,7 +298,7 @@ void PageHub::send_past(PageSession& session) const {
   if (run_message_) connection.send(MessageKind::kText, run_message_, Delivery::kAlways);
   if (status_message_)
     connection.send(MessageKind::kText, status_message_, Delivery::kNewest, kStatusKey);
-  for (const Event& event : events_)
+  for (const RunEvent& event : events_)
     if (has_run_ && event.run_id == frames_.run_id())
       connection.send(MessageKind::kText, make_message(event), Delivery::kAlways);
 }
@@ -367,12 +355,12 @@ void PageHub::start_run(const Parameters& parameters) {
   for (PageSession* session : sessions_)
     if (session->selected() && !frames_.has_vehicle(*session->selected()))
       session->forget_selection();
-  for (const Event& event : events_)
+  for (const RunEvent& event : events_)
     if (event.run_id == frames_.run_id()) send_all(make_message(event), Delivery::kAlways);
 }
 
 /// Message about an event of the current run.
-Payload PageHub::make_message(const Event& event) const {
+Payload PageHub::make_message(const RunEvent& event) const {
   return to_payload({{"op", "event"},
                      {"run_id", to_hex(event.run_id)},
                      {"step", event.step},
@@ -380,10 +368,10 @@ Payload PageHub::make_message(const Event& event) const {
                      {"text", event.text}});
 }
 
-void PageHub::note_event(std::uint64_t run_id, std::uint64_t step, const std::string& text) {
-  Event event{run_id, step, text};
-  if (has_run_ && run_id == frames_.run_id()) send_all(make_message(event), Delivery::kAlways);
-  events_.push_back(std::move(event));
+void PageHub::note_event(const RunEvent& event) {
+  if (has_run_ && event.run_id == frames_.run_id())
+    send_all(make_message(event), Delivery::kAlways);
+  events_.push_back(event);
   if (events_.size() > kPastEvents) events_.pop_front();
 }
 

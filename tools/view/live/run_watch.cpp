@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "tools/ctl/status_view.hpp"
+#include "tools/ctl/operator_client.hpp"
 
 namespace sls::view {
 namespace {
@@ -40,15 +40,9 @@ std::deque<RunEvent> RunWatch::take_events() {
   return std::exchange(events_, {});
 }
 
-std::optional<sync::Run> RunWatch::find_ended_run() const {
-  for (const sync::Run& run : servers_.runs())
-    if (run.status && sync::serves_vehicle(run.parameters, vehicle_id_)) return run;
-  return std::nullopt;
-}
-
 std::optional<sync::Run> RunWatch::choose_run() const {
   auto best = servers_.find_joinable(vehicle_id_);
-  if (!run_) return best ? best : find_ended_run();
+  if (!run_) return best ? best : ctl::find_any_run(servers_, vehicle_id_);
   const std::uint64_t run_id = run_->parameters.run_id();
   const auto status = servers_.find_status(run_id);
   const bool goes_on = servers_.is_known(run_id) && sync::calc_progress(status) >= 0;

@@ -19,13 +19,6 @@
 
 namespace sls::view {
 
-/// An event of a run: a new reason in its status.
-struct RunEvent {
-  std::uint64_t run_id = 0;
-  std::uint64_t step = 0;
-  std::string text;
-};
-
 /// Call the functions from one thread. Samples arrive on threads of the middleware.
 class RunWatch {
  public:
@@ -44,7 +37,6 @@ class RunWatch {
   using Mark = std::tuple<std::uint64_t, std::uint64_t, std::uint64_t, std::size_t, bool, bool>;
 
   std::optional<sync::Run> choose_run() const;
-  std::optional<sync::Run> find_ended_run() const;
   void note(const SimStatus& status);
 
   const std::uint32_t vehicle_id_;

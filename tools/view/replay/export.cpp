@@ -1,11 +1,11 @@
 #include "tools/view/replay/export.hpp"
 
+#include <openssl/evp.h>
 #include <spdlog/fmt/fmt.h>
 #include <unistd.h>
 #include <zlib.h>
 
 #include <cerrno>
-#include <cstdint>
 #include <fstream>
 #include <stdexcept>
 #include <system_error>
@@ -22,20 +22,10 @@ constexpr std::size_t kMostPageBytes = 16 << 20;
 constexpr std::string_view kModeId = "id=\"sls-mode\"";
 
 std::string to_base64(std::string_view bytes) {
-  constexpr const char* kLetters =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t at = 0; at < bytes.size(); at += 3) {
-    const auto byte = [&](std::size_t index) {
-      return index < bytes.size() ? static_cast<std::uint8_t>(bytes[index]) : 0u;
-    };
-    const std::uint32_t three = byte(at) << 16 | byte(at + 1) << 8 | byte(at + 2);
-    text += kLetters[three >> 18];
-    text += kLetters[three >> 12 & 63];
-    text += at + 1 < bytes.size() ? kLetters[three >> 6 & 63] : '=';
-    text += at + 2 < bytes.size() ? kLetters[three & 63] : '=';
-  }
+  std::string text((bytes.size() + 2) / 3 * 4, '\0');  // a NUL is written behind it
+  ::EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
+                    reinterpret_cast<const unsigned char*>(bytes.data()),
+                    static_cast<int>(bytes.size()));
   return text;
 }
 

@@ -4,14 +4,12 @@
 
 #include <algorithm>
 #include <charconv>
-#include <fstream>
-#include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <string>
 
 #include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
+#include "common/config/scenario_reader.hpp"
 #include "recorder/columns.hpp"
 #include "recorder/rows.hpp"
 #include "recorder/sinks/csv/csv_reader.hpp"
@@ -23,20 +21,6 @@ namespace fs = std::filesystem;
 
 constexpr std::size_t kMostSignals = 64;  // MOST_NUMBERS of idl/sls.idl
 
-std::string read_scenario(const fs::path& file) {
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream)
-    throw config::ConfigError(file.string() +
-                              ": expected the recording's scenario, got no file that can be read");
-  std::string text(config::kMaxScenarioBytes + 1, '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (text.size() > config::kMaxScenarioBytes)
-    throw config::ConfigError(fmt::format("{}: expected a scenario of at most {} bytes, got more",
-                                          file.string(), config::kMaxScenarioBytes));
-  return text;
-}
-
 std::uint64_t parse_run_id(const std::string& text, const fs::path& folder) {
   std::uint64_t run_id = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), run_id, 16);
@@ -46,23 +30,9 @@ std::uint64_t parse_run_id(const std::string& text, const fs::path& folder) {
   return run_id;
 }
 
-/// Units of the plant's signals by name; empty if the manifest has no signals.
-std::map<std::string, std::string> read_units(const fs::path& folder) {
-  std::map<std::string, std::string> units;
-  std::ifstream stream(folder / "manifest.json", std::ios::binary);
-  try {
-    const auto manifest = nlohmann::json::parse(stream);
-    for (const auto& signal : manifest.value("signals", nlohmann::json::array()))
-      units[signal.at("name")] = signal.at("unit");
-  } catch (const nlohmann::json::exception& error) {
-    throw config::ConfigError((folder / "manifest.json").string() +
-                              ": signals: expected names and units, got: " + error.what());
-  }
-  return units;
-}
-
 /// Sets the attitude and the signals from the columns of state.csv beyond those of a point mass.
-void set_columns(Parameters& message, const fs::path& folder) {
+void set_columns(Parameters& message, const fs::path& folder,
+                 const record::ManifestFile& manifest) {
   const record::CsvReader file(folder / record::StateRow::kFile,
                                record::make_header<record::StateRow>(),
                                record::CsvReader::Further::kAllowed);
@@ -80,12 +50,11 @@ void set_columns(Parameters& message, const fs::path& folder) {
     throw record::DamagedError(fmt::format("{}:1: expected at most {} signals, got {}",
                                            (folder / record::StateRow::kFile).string(),
                                            kMostSignals, file.columns().size() - count));
-  const auto units = read_units(folder);
   for (std::size_t index = count; index < file.columns().size(); ++index) {
     SignalDescription& signal = message.signals().emplace_back();
     signal.name(file.columns()[index]);
-    const auto unit = units.find(file.columns()[index]);
-    if (unit != units.end()) signal.unit(unit->second);
+    for (const record::ManifestFile::Signal& of_manifest : manifest.signals)
+      if (of_manifest.name == file.columns()[index]) signal.unit(of_manifest.unit);
   }
 }
 
@@ -112,7 +81,8 @@ RecordedParameters load_parameters(const record::OpenedRecording& flight) {
   const record::ManifestFile& manifest = flight.segments.front().manifest;
   const fs::path file = flight.folder / "scenario.yaml";
   RecordedParameters parameters;
-  parameters.scenario = config::parse_scenario(read_scenario(file), file.string());
+  parameters.scenario = config::parse_scenario(
+      config::read_config_file(file, "the recording's scenario"), file.string());
   Parameters& message = parameters.message;
   message.run_id(parse_run_id(manifest.run_id, flight.folder));
   message.scenario_text(parameters.scenario.text);
@@ -129,7 +99,7 @@ RecordedParameters load_parameters(const record::OpenedRecording& flight) {
   message.mode(is_lockstep ? SyncMode::MODE_LOCKSTEP : SyncMode::MODE_REALTIME);
   message.real_time_factor(is_lockstep ? 0 : parameters.scenario.sync.real_time_factor);
   set_vehicles(message, parameters.scenario, flight);
-  set_columns(message, flight.folder);
+  set_columns(message, flight.folder, manifest);
   return parameters;
 }
 

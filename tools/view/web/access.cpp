@@ -1,23 +1,20 @@
 #include "tools/view/web/access.hpp"
 
-#include <arpa/inet.h>
-#include <fcntl.h>
-
 #include <openssl/crypto.h>
 #include <spdlog/fmt/fmt.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <array>
 #include <cerrno>
 #include <charconv>
 #include <cstdint>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <system_error>
 
 #include "common/config/config_error.hpp"
 #include "common/text/sha256.hpp"
+#include "tools/view/web/asio.hpp"
 #include "tools/view/web/request_text.hpp"
 
 namespace sls::view {
@@ -28,31 +25,20 @@ constexpr std::size_t kMostToken = 256;
 
 // --- addresses -----------------------------------------------------------------------------------
 
-/// IPv4 as ::ffff:a.b.c.d, so that both families compare alike.
-using Ip = std::array<std::uint8_t, 16>;
+using net::ip::address;
 
-constexpr Ip kMapped = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0xff, 0xff, 0, 0, 0, 0};
-constexpr Ip kLoopback6 = {0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 1};
-constexpr std::size_t kMappedBytes = 12;
-
-std::optional<Ip> parse_ip(const std::string& text) {
-  Ip ip = kMapped;
-  if (::inet_pton(AF_INET, text.c_str(), ip.data() + kMappedBytes) == 1) return ip;
-  if (::inet_pton(AF_INET6, text.c_str(), ip.data()) == 1) return ip;
-  return std::nullopt;
+/// An address without a scope. IPv4 in IPv6 is IPv4, so that both families compare alike.
+std::optional<address> parse_ip(const std::string& text) {
+  Error error;
+  const address ip = net::ip::make_address(text, error);
+  if (error || text.find('%') != std::string::npos) return std::nullopt;
+  return unmap(ip);
 }
-
-bool is_loopback(const Ip& ip) {
-  const bool is_v4 = std::equal(ip.begin(), ip.begin() + kMappedBytes, kMapped.begin());
-  return is_v4 ? ip[kMappedBytes] == 127 : ip == kLoopback6;
-}
-
-bool is_wildcard(const Ip& ip) { return ip == kMapped || ip == Ip{}; }
 
 /// HOST[:PORT] of a header.
 struct Authority {
   std::string host;  ///< lower case, without the brackets of IPv6
-  std::optional<Ip> ip;
+  std::optional<address> ip;
   std::optional<std::uint16_t> port;
 };
 
@@ -96,14 +82,14 @@ std::optional<Authority> parse_authority(std::string_view text) {
 bool is_loopback_address(const std::string& address) {
   if (to_lower(address) == "localhost") return true;
   const auto ip = parse_ip(address);
-  return ip && is_loopback(*ip);
+  return ip && ip->is_loopback();
 }
 
 bool is_own_host(const Authority& host, const std::string& listened) {
   if (!host.ip) return host.host == "localhost";
-  if (is_loopback(*host.ip)) return true;
+  if (host.ip->is_loopback()) return true;
   const auto own = parse_ip(listened);
-  return own && (*own == *host.ip || is_wildcard(*own));
+  return own && (*own == *host.ip || own->is_unspecified());
 }
 
 // --- origins -------------------------------------------------------------------------------------
@@ -166,22 +152,6 @@ Access judge_operating(const RequestOrigin& request, const AccessOptions& option
 
 // --- the token's file ----------------------------------------------------------------------------
 
-/// A file descriptor that is closed with this object.
-class File {
- public:
-  explicit File(const std::string& path)
-      : descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {}
-  ~File() {
-    if (descriptor_ >= 0) ::close(descriptor_);
-  }
-  File(const File&) = delete;
-  File& operator=(const File&) = delete;
-  int descriptor() const { return descriptor_; }
-
- private:
-  const int descriptor_;
-};
-
 [[noreturn]] void fail_token(const std::string& path, const std::string& expected,
                              const std::string& got) {
   throw config::ConfigError(
@@ -191,17 +161,18 @@ class File {
 /// The file's first line. A line that is too long is cut, but only after the limit, so that the
 /// caller detects it.
 std::string read_first_line(const std::string& path) {
-  const File file(path);
-  if (file.descriptor() < 0) fail_token(path, "a file that can be read", std::strerror(errno));
-  struct stat status = {};
-  if (::fstat(file.descriptor(), &status) != 0 || !S_ISREG(status.st_mode))
-    fail_token(path, "a regular file", "another kind");
-  if ((status.st_mode & 077) != 0)
-    fail_token(path, "mode 0600 or stricter", fmt::format("{:04o}", status.st_mode & 07777));
-  std::array<char, kMostToken + 3> bytes;
-  const ssize_t size = ::read(file.descriptor(), bytes.data(), bytes.size());
-  if (size < 0) fail_token(path, "a file that can be read", std::strerror(errno));
-  std::string line(bytes.data(), static_cast<std::size_t>(size));
+  std::error_code error;
+  const auto status = std::filesystem::status(path, error);
+  if (error) fail_token(path, "a file that can be read", error.message());
+  if (!is_regular_file(status)) fail_token(path, "a regular file", "another kind");
+  const auto mode = static_cast<unsigned>(status.permissions());
+  if ((mode & 077) != 0)
+    fail_token(path, "mode 0600 or stricter", fmt::format("{:04o}", mode & 07777));
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) fail_token(path, "a file that can be read", std::strerror(errno));
+  std::string line(kMostToken + 3, '\0');
+  stream.read(line.data(), static_cast<std::streamsize>(line.size()));
+  line.resize(static_cast<std::size_t>(stream.gcount()));
   line.erase(std::min(line.find('\n'), line.size()));
   if (!line.empty() && line.back() == '\r') line.pop_back();
   return line;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <boost/asio/detail/socket_option.hpp>
-#include <boost/asio/ip/address.hpp>
 #include <tuple>
 
 #include "tools/view/web/http_session.hpp"
@@ -29,9 +28,7 @@ void set_options(Socket& socket) {
 
 std::string name_network(const Socket& socket) {
   Error ignored;
-  net::ip::address address = socket.remote_endpoint(ignored).address();
-  if (address.is_v6() && address.to_v6().is_v4_mapped())
-    address = net::ip::make_address_v4(net::ip::v4_mapped, address.to_v6());
+  const net::ip::address address = unmap(socket.remote_endpoint(ignored).address());
   if (address.is_loopback()) return "loopback";
   if (address.is_v4()) return address.to_string();
   const auto bytes = address.to_v6().to_bytes();

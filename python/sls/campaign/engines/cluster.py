@@ -1,4 +1,4 @@
-"""Functions of all engines for clusters."""
+"""Functions that the engines for clusters share."""
 
 import os
 import time

@@ -1,8 +1,4 @@
-"""Flies a campaign on the workers of a Dask scheduler. See README.md beside this file.
-
-A task is one chunk. The worker writes it into the campaign's folder, which must be on a file system
-that all machines share; only a small dict returns through Dask. If a worker is killed, the scheduler
-gives its chunk to another worker; after several killed workers it gives the chunk up."""
+"""Flies a campaign on the workers of a Dask scheduler. See README.md beside this file."""
 
 import logging
 import queue
@@ -10,6 +6,7 @@ import re
 import sys
 import time
 import uuid
+from contextlib import suppress
 from typing import Any
 
 from sls.campaign.engines import EngineError, EngineOptions
@@ -191,17 +188,10 @@ def run(folder: CampaignFolder, options: EngineOptions) -> None:
         raise EngineError(f"dask: the scheduler {options.scheduler} is lost; "
                           f"{describe_rest(folder)}") from None
     finally:
-        close(client)
+        with suppress(Exception):  # the scheduler is lost; else it drops the client's futures
+            client.close(timeout=2)
     if flight.given_up:
         raise EngineError("; ".join(flight.given_up))
     if missing := find_missing(folder):
         raise EngineError(f"{folder.chunk_file(missing[0])}: flown by a worker, but not there: "
                           "expected a file system that the workers share")
-
-
-def close(client: Any) -> None:
-    """Closes the client. The scheduler then drops the client's futures."""
-    try:
-        client.close(timeout=2)
-    except Exception:  # the scheduler is lost
-        pass

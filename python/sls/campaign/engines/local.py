@@ -12,7 +12,7 @@ import subprocess
 import sys
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -39,11 +39,9 @@ class Worker:
     def give(self, chunk: int, announce: bool) -> None:
         self.chunk, self.run = chunk, None
         assert self.process.stdin
-        try:
+        with suppress(BrokenPipeError):  # the process has ended: `run` finds this by the end of its stdout
             self.process.stdin.write(b"%d%s\n" % (chunk, b" announce" if announce else b""))
             self.process.stdin.flush()
-        except BrokenPipeError:
-            pass  # the process has ended: `run` finds this by the end of its stdout
 
     def describe_end(self) -> str:
         code = self.process.wait()
@@ -60,10 +58,6 @@ class Work:
     tries: dict[int, int] = field(default_factory=dict)
     failed_starts: int = 0  # without a successful start between them
     given_up: list[str] = field(default_factory=list)
-
-
-def count_cores() -> int:
-    return len(os.sched_getaffinity(0))
 
 
 def start_worker(folder: CampaignFolder) -> Worker:
@@ -96,11 +90,7 @@ def started(workers: list[Worker], folder: CampaignFolder) -> Iterator[None]:
             except subprocess.TimeoutExpired:
                 worker.process.kill()
                 worker.process.wait()
-            for pipe in (worker.process.stdin, worker.process.stdout):
-                try:
-                    pipe.close()
-                except BrokenPipeError:
-                    pass
+            close(worker)
         folder.remove_leftovers()
 
 
@@ -116,7 +106,7 @@ def run(folder: CampaignFolder, options: EngineOptions) -> None:
             workers.append(worker)
             selector.register(worker.process.stdout, selectors.EVENT_READ, worker)
 
-        for _ in range(min(options.workers or count_cores(), len(work.waiting))):
+        for _ in range(min(options.workers or len(os.sched_getaffinity(0)), len(work.waiting))):
             add_worker()
         while workers:
             for key, _ in selector.select(progress.until_next_s()):
@@ -165,10 +155,8 @@ def hear(worker: Worker, message: dict, work: Work, progress: Progress) -> None:
 
 def close(worker: Worker) -> None:
     worker.process.stdout.close()
-    try:
+    with suppress(BrokenPipeError):
         worker.process.stdin.close()
-    except BrokenPipeError:
-        pass
 
 
 def note_end(worker: Worker, work: Work, folder: CampaignFolder) -> bool:

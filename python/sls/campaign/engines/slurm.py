@@ -1,8 +1,4 @@
-"""Flies a campaign as job arrays of Slurm. See README.md beside this file.
-
-A task of an array flies a few chunks, which together take at least a minute. Slurm queues a task
-again when its node is lost. This process submits chunks again that are missing after all tasks have
-ended. A collect job waits for the array; it does the rest if this process has ended by then."""
+"""Flies a campaign as job arrays of Slurm. See README.md beside this file."""
 
 import getpass
 import hashlib
@@ -92,14 +88,9 @@ def list_states(name: str) -> Counter[str]:
 
 
 def describe(states: Counter[str]) -> str:
-    return ", ".join(f"{count} {state.lower() if state.isupper() else describe_state(state)}"
-                     for state, count in sorted(states.items()))
-
-
-def describe_state(state: str) -> str:
-    """Converts `PENDING Resources` to `pending (Resources)`."""
-    name, _, reason = state.partition(" ")
-    return f"{name.lower()} ({reason})"
+    """Counts and states as text: `PENDING Resources` becomes `pending (Resources)`."""
+    return ", ".join(f"{count} {name.lower()}" + (f" ({reason})" if reason else "")
+                     for state, count in sorted(states.items()) for name, _, reason in [state.partition(" ")])
 
 
 def describe_status(folder: CampaignFolder) -> list[str]:
@@ -141,12 +132,6 @@ def measure_run_s(folder: CampaignFolder, missing: Sequence[int]) -> float:
     begin = time.monotonic()
     count = sum(1 for _ in fly_range(folder.campaign, flyer, first, min(first + 2, last), own))
     return (time.monotonic() - begin) / count
-
-
-def make_tasks(missing: Sequence[int], chunks_each: int) -> list[list[int]]:
-    """The chunks of each task."""
-    return [list(missing[begin:begin + chunks_each])
-            for begin in range(0, len(missing), chunks_each)]
 
 
 def to_ranges(numbers: Sequence[int]) -> str:
@@ -240,7 +225,7 @@ def submit_round(folder: CampaignFolder, missing: Sequence[int], number: int,
     # With --chunk-runs a task flies one chunk.
     chunks_each = 1 if options.chunk_runs else max(
         1, -(-int(TASK_S / max(run_s, 1e-6)) // folder.plan.chunk_runs))
-    tasks = make_tasks(missing, chunks_each)
+    tasks = [list(missing[begin:begin + chunks_each]) for begin in range(0, len(missing), chunks_each)]
     largest = find_largest_array()
     at_once = f"%{options.workers}" if options.workers else ""
     done = Round(number)
@@ -354,7 +339,10 @@ def run(folder: CampaignFolder, options: EngineOptions) -> None:
         raise EngineError(describe_loss(folder, error)) from None
     except KeyboardInterrupt as interrupt:
         if type(interrupt) is KeyboardInterrupt:
-            cancel_quietly(folder)
+            try:
+                cancel(folder)
+            except (EngineError, ControllerLost) as error:
+                say(f"could not cancel job {name_job(folder)}: {error}")
         else:
             say(f"the jobs go on, and job {name_collect_job(folder)} makes runs.csv")
         raise
@@ -366,13 +354,6 @@ def describe_missing(folder: CampaignFolder, missing: Sequence[int], submitted: 
     first, last = folder.find_chunk(missing[0])
     return (f"slurm: {len(missing)} chunks are missing after {submitted.number} submissions, first "
             f"that of runs {first}-{last}: {find_reason(folder, submitted.jobs)}")
-
-
-def cancel_quietly(folder: CampaignFolder) -> None:
-    try:
-        cancel(folder)
-    except (EngineError, ControllerLost) as error:
-        say(f"could not cancel job {name_job(folder)}: {error}")
 
 
 # --- the collect job ------------------------------------------------------------------------------

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <sstream>
-#include <utility>
 
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "tests/support/waiting.hpp"

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
-#include <cstdlib>
 #include <nlohmann/json.hpp>
 
 #include "tests/system/flight.hpp"

@@ -79,7 +79,7 @@ class FakeConnection final : public Connection {
   std::uint16_t close_code = 0;
 };
 
-class FakeFlight final : public FlightSource {
+class FakeFlight final : public Feed, public Operator {
  public:
   void add(Feed::Listener& listener) override {
     listeners.push_back(&listener);

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <numeric>
+
 #include "tests/support/text.hpp"
 #include "tests/tools/view/foxglove/fakes.hpp"
 
@@ -70,10 +72,9 @@ class FoxgloveSessionTest : public ::testing::Test {
     return 0;
   }
 
-  test::FakeFlight* flight = new test::FakeFlight;  // owned by `hub`
+  const std::unique_ptr<test::FakeFlight> flight = std::make_unique<test::FakeFlight>();
   std::chrono::steady_clock::time_point now{1h};
-  std::shared_ptr<Hub> hub =
-      std::make_shared<Hub>(std::unique_ptr<FlightSource>(flight), [this] { return now; });
+  std::shared_ptr<Hub> hub = std::make_shared<Hub>(*flight, *flight, [this] { return now; });
   test::FakeConnection connection;
   std::unique_ptr<FoxgloveSession> session;
 };
@@ -188,6 +189,22 @@ TEST_F(FoxgloveSessionTest, MirrorsComeAtMost100TimesASecondForEachVehicle) {
   }
 }
 
+TEST_F(FoxgloveSessionTest, EveryVehicleOfAFleetOf100IsMirrored) {
+  std::vector<std::uint32_t> ids(100);
+  std::iota(ids.begin(), ids.end(), 0u);
+  flight->begin_run(kRun, ids);
+  connect();
+  for (const std::uint32_t id : ids)
+    subscribe(id, find_channel("/sls/vehicle_" + std::to_string(id) + "/load/pose"));
+  for (std::uint64_t step = 0; step < 100; ++step, now += 10ms)
+    for (auto first = ids.begin(); first != ids.end(); first += 20)  // a step has several batches
+      flight->publish(TopicId::kRecord, make_batch(step, 1, {first, first + 20}));
+  std::map<std::uint64_t, int> counts;
+  for (const std::string& message : connection.find(kMessageData))
+    ++counts[test::read_number(message, 1, 4)];
+  for (const std::uint32_t id : ids) EXPECT_GE(counts[id], 95) << id;
+}
+
 TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertised) {
   flight->begin_run(kRun, {0, 1});
   connect();
@@ -198,6 +215,7 @@ TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertis
   std::uint32_t id = 0;
   for (const auto& [topic, channel] : before) subscribe(id++, channel);
   EXPECT_EQ(errors(), std::vector<std::string>());
+  flight->publish(TopicId::kState, make_states(1000));
   connection.sent.clear();
   flight->begin_run(kRun + 1, {0, 2});
   EXPECT_EQ(connection.find("serverInfo").at(0).at("sessionId"), "0000000000001235");
@@ -217,6 +235,11 @@ TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertis
     EXPECT_TRUE(holds(topic, "vehicle_1")) << topic;
     EXPECT_EQ(come.count(sls::test::replace_once(topic, "vehicle_1", "vehicle_2")), 1U) << topic;
   }
+  // Other subscriptions stay, and time starts again. The first message is the static transform.
+  now += 1s;
+  flight->publish(TopicId::kState, make_states(1, kRun + 1));
+  EXPECT_EQ(connection.find(kMessageData).size(), 2U);
+  EXPECT_EQ(test::read_number(connection.find(kTime).back(), 1, 8), 4'000'000U);
   // The client may end subscriptions that have ended already: that is no error of the client.
   Json ids = Json::array();
   for (std::uint32_t i = 0; i < id; ++i) ids.push_back(i);
@@ -228,7 +251,7 @@ TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertis
 TEST_F(FoxgloveSessionTest, EventsAndSilenceAreReportedInWords) {
   flight->begin_run(kRun, {0});
   connect();
-  hub->note_event(kRun, 250, "controller pilot took over");
+  hub->note_event({kRun, 250, "controller pilot took over"});
   EXPECT_EQ(connection.find_statuses(0).back(), "1.000 s: controller pilot took over");
   flight->run->is_silent = true;
   flight->run->silence_s = 2.3;
@@ -377,85 +400,76 @@ TEST_F(FoxgloveSessionTest, ARequestWithoutPermissionToOperateIsRefused) {
 
 // --- bad input -----------------------------------------------------------------------------------
 
-struct BadText {
+struct BadMessage {
   const char* name;
-  std::string text;
+  std::string bytes;
   std::string expected;  // in the answer
+  MessageKind kind = MessageKind::kText;
 };
 
-class FoxgloveBadTextTest : public FoxgloveSessionTest,
-                            public ::testing::WithParamInterface<BadText> {};
+class FoxgloveBadMessageTest : public FoxgloveSessionTest,
+                               public ::testing::WithParamInterface<BadMessage> {};
 
-TEST_P(FoxgloveBadTextTest, IsAnsweredInWords) {
+TEST_P(FoxgloveBadMessageTest, IsAnsweredInWords) {
   flight->begin_run(kRun, {0});
   connect();
   subscribe(5, find_channel("sls/state"));
-  send(GetParam().text);
+  session->receive(GetParam().kind, GetParam().bytes);
   ASSERT_EQ(errors().size(), 1U);
   EXPECT_TRUE(holds(errors()[0], GetParam().expected)) << errors()[0];
   EXPECT_EQ(connection.close_code, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(
-    Messages, FoxgloveBadTextTest,
+    Messages, FoxgloveBadMessageTest,
     ::testing::Values(
-        BadText{"NoJson", "hello", "expected JSON, at most 16 keys an object, got 'hello'"},
-        BadText{"Empty", "", "expected JSON"},  //
-        BadText{"Binary", "\xff\x80{}", "got '??{}'"},
-        BadText{"Nested", std::string(60'000, '['), "expected JSON"},
-        BadText{
+        BadMessage{"NoJson", "hello", "expected JSON, at most 16 keys an object, got 'hello'"},
+        BadMessage{"Empty", "", "expected JSON"},  //
+        BadMessage{"Binary", "\xff\x80{}", "got '??{}'"},
+        BadMessage{"Nested", std::string(60'000, '['), "expected JSON"},
+        BadMessage{
             "Keys",
             R"({"a":0,"b":0,"c":0,"d":0,"e":0,"f":0,"g":0,"h":0,"i":0,"j":0,"k":0,"l":0,"m":0,"n":0,"o":0,"p":0,"q":0})",
             "expected JSON"},
-        BadText{"Array", "[]", "expected a JSON object"},
-        BadText{"NoOp", "{}", "expected a JSON object with the text op"},
-        BadText{"OpNumber", R"({"op":3})", "expected a JSON object with the text op"},
-        BadText{"UnknownOp", R"({"op":"dance"})", "got 'dance'"},
-        BadText{"ClientPublish", R"({"op":"advertise","channels":[]})", "clientPublish"},
-        BadText{"Parameters", R"({"op":"setParameters"})", "capability parameters"},
-        BadText{"Graph", R"({"op":"subscribeConnectionGraph"})", "connectionGraph"},
-        BadText{"Assets", R"({"op":"fetchAsset","uri":"file:///etc/passwd"})", "assets"},
-        BadText{"NoSubscriptions", R"({"op":"subscribe"})", "expected an array"},
-        BadText{"SubscriptionsText", R"({"op":"subscribe","subscriptions":"all"})", "array"},
-        BadText{"SubscriptionText", R"({"op":"subscribe","subscriptions":["a"]})", "objects"},
-        BadText{"NegativeId", R"({"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]})",
-                "whole numbers"},
-        BadText{"FractionalId", R"({"op":"subscribe","subscriptions":[{"id":1.5,"channelId":1}]})",
-                "whole numbers"},
-        BadText{"HugeId", R"({"op":"subscribe","subscriptions":[{"id":4294967296,"channelId":1}]})",
-                "whole numbers"},
-        BadText{"UnknownChannel",
-                R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":999999}]})",
-                "there is no channel 999999"},
-        BadText{"UsedId", R"({"op":"subscribe","subscriptions":[{"id":5,"channelId":2}]})",
-                "subscription 5 is in use"},
-        BadText{"UsedChannel", R"({"op":"subscribe","subscriptions":[{"id":6,"channelId":1}]})",
-                "channel 1 is subscribed to already"},
-        BadText{"NotSubscribed", R"({"op":"unsubscribe","subscriptionIds":[6]})",
-                "there is no subscription 6"},
-        BadText{"UnsubscribeText", R"({"op":"unsubscribe","subscriptionIds":["5"]})",
-                "whole numbers"},
-        BadText{"UnsubscribeNone", R"({"op":"unsubscribe"})", "array"}),
-    [](const auto& test) { return test.param.name; });
-
-class FoxgloveBadBytesTest : public FoxgloveSessionTest,
-                             public ::testing::WithParamInterface<BadText> {};
-
-TEST_P(FoxgloveBadBytesTest, AreAnsweredInWords) {
-  connect();
-  session->receive(MessageKind::kBinary, GetParam().text);
-  ASSERT_EQ(errors().size(), 1U);
-  EXPECT_TRUE(holds(errors()[0], GetParam().expected)) << errors()[0];
-}
-
-INSTANTIATE_TEST_SUITE_P(
-    Messages, FoxgloveBadBytesTest,
-    ::testing::Values(BadText{"Empty", "", "got no byte"},
-                      BadText{"Publish", std::string("\1\0\0\0\0hello", 10), "clientPublish"},
-                      BadText{"UnknownOpcode", "\x80", "got 128"},
-                      BadText{"ShortCall", std::string("\2\0\0\0", 4), "got 4 bytes"},
-                      BadText{"LongEncoding", std::string("\2\0\0\0\0\0\0\0\0\xff\xff\xff\xff", 13),
-                              "13 bytes"}),
+        BadMessage{"Array", "[]", "expected a JSON object"},
+        BadMessage{"NoOp", "{}", "expected a JSON object with the text op"},
+        BadMessage{"OpNumber", R"({"op":3})", "expected a JSON object with the text op"},
+        BadMessage{"UnknownOp", R"({"op":"dance"})", "got 'dance'"},
+        BadMessage{"ClientPublish", R"({"op":"advertise","channels":[]})", "clientPublish"},
+        BadMessage{"Parameters", R"({"op":"setParameters"})", "capability parameters"},
+        BadMessage{"GetParameters", R"({"op":"getParameters"})", "capability parameters"},
+        BadMessage{"Graph", R"({"op":"subscribeConnectionGraph"})", "connectionGraph"},
+        BadMessage{"Assets", R"({"op":"fetchAsset","uri":"file:///etc/passwd"})", "assets"},
+        BadMessage{"NoSubscriptions", R"({"op":"subscribe"})", "expected an array"},
+        BadMessage{"SubscriptionsText", R"({"op":"subscribe","subscriptions":"all"})", "array"},
+        BadMessage{"SubscriptionText", R"({"op":"subscribe","subscriptions":["a"]})", "objects"},
+        BadMessage{"NegativeId", R"({"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]})",
+                   "whole numbers"},
+        BadMessage{"FractionalId",
+                   R"({"op":"subscribe","subscriptions":[{"id":1.5,"channelId":1}]})",
+                   "whole numbers"},
+        BadMessage{"HugeId",
+                   R"({"op":"subscribe","subscriptions":[{"id":4294967296,"channelId":1}]})",
+                   "whole numbers"},
+        BadMessage{"UnknownChannel",
+                   R"({"op":"subscribe","subscriptions":[{"id":1,"channelId":999999}]})",
+                   "there is no channel 999999"},
+        BadMessage{"UsedId", R"({"op":"subscribe","subscriptions":[{"id":5,"channelId":2}]})",
+                   "subscription 5 is in use"},
+        BadMessage{"UsedChannel", R"({"op":"subscribe","subscriptions":[{"id":6,"channelId":1}]})",
+                   "channel 1 is subscribed to already"},
+        BadMessage{"NotSubscribed", R"({"op":"unsubscribe","subscriptionIds":[6]})",
+                   "there is no subscription 6"},
+        BadMessage{"UnsubscribeText", R"({"op":"unsubscribe","subscriptionIds":["5"]})",
+                   "whole numbers"},
+        BadMessage{"UnsubscribeNone", R"({"op":"unsubscribe"})", "array"},
+        BadMessage{"NoByte", "", "got no byte", MessageKind::kBinary},
+        BadMessage{"Publish", std::string("\1\0\0\0\0hello", 10), "clientPublish",
+                   MessageKind::kBinary},
+        BadMessage{"UnknownOpcode", "\x80", "got 128", MessageKind::kBinary},
+        BadMessage{"ShortCall", std::string("\2\0\0\0", 4), "got 4 bytes", MessageKind::kBinary},
+        BadMessage{"LongEncoding", std::string("\2\0\0\0\0\0\0\0\0\xff\xff\xff\xff", 13),
+                   "13 bytes", MessageKind::kBinary}),
     [](const auto& test) { return test.param.name; });
 
 TEST_F(FoxgloveSessionTest, AfterManyErrorsTheConnectionIsClosed) {

@@ -1,7 +1,6 @@
 /// A fake connection that keeps all messages.
 #pragma once
 
-#include <map>
 #include <nlohmann/json.hpp>
 #include <string>
 #include <vector>

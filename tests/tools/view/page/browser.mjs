@@ -31,7 +31,7 @@ export async function startBrowser({ flags = [] } = {}) {
   };
 }
 
-/** A tab that shares nothing with the others; `errors` and `requests` grow. */
+/** A tab that shares nothing with the others; `errors` and `requests` grow. The fragment of an address is never sent. */
 export async function open(browser, { width = 1366, height = 768, scheme = "dark", touch = false, motion = "no-preference" } = {}) {
   const context = await browser.createBrowserContext();
   const page = await context.newPage();
@@ -43,12 +43,15 @@ export async function open(browser, { width = 1366, height = 768, scheme = "dark
   page.on("console", (message) => ["error", "warn"].includes(message.type()) && !/ReadPixels/.test(message.text()) &&
     errors.push(message.text()));
   page.on("pageerror", (error) => errors.push(String(error)));
-  page.on("request", (request) => requests.push(request.url()));
+  page.on("request", (request) => requests.push(request.url().split("#")[0]));
+  const session = await page.createCDPSession();
+  await session.send("Network.enable");
+  session.on("Network.webSocketCreated", ({ url }) => requests.push(url));
   return { page, errors, requests, close: () => context.close() };
 }
 
 /** Waits until `check` returns a true value. @throws Error after `limit` ms, with the last value. */
-export async function waitFor(what, check, limit = 30_000) {
+export async function waitFor(what, check, limit = 60_000) {
   const end = performance.now() + limit;
   let last;
   for (;;) {

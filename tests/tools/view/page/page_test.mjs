@@ -1,37 +1,70 @@
-// The page in Chromium with a fake server and a flight from closed forms: node page_test.mjs PAGE_HTML FOLDER [WORD]
-// PAGE_HTML: the built page; FOLDER: for screenshots; WORD: run only tests with this word in their name.
+// The page in Chromium with a flight of the real programs: node --test page_test.mjs, with the build folder in SLS_BUILD.
 import assert from "node:assert/strict";
-import { mkdirSync } from "node:fs";
+import { readFileSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { startFlight } from "../flight.mjs";
 import { kLean, open, readPixels, startBrowser, waitFor } from "./browser.mjs";
-import { calcLoad, calcQuad, startFakeServer } from "./fake_server.mjs";
 
-const [html, folder, word = ""] = process.argv.slice(2);
-mkdirSync(folder, { recursive: true });
-
-const kQuad = [0x1f, 0x84, 0xd6];
-const kLoad = [0xe0, 0x86, 0x00];
+const kColours = { quad: [0x1f, 0x84, 0xd6], load: [0xe0, 0x86, 0x00] };
 const kTolerance = 6; // of 255: a smooth edge is far from it, a rounded colour is not
+const kPlaces = [[0, 0], [-3, -2], [3, -2], [-3, 2], [3, 2]];
+
+let chromium, flight;
+before(async () => {
+  chromium = await startBrowser({ flags: kLean });
+  flight = await startFlight();
+});
+after(async () => {
+  await chromium?.stop();
+  await flight?.stop();
+});
 
 const state = (page) => page.evaluate(() => window.slsView.state());
-const untilFlies = (page) => waitFor("poses", () => page.evaluate(() => (window.slsView?.state().step ?? 0) > 0));
-const isColour = (pixel, expected) => pixel.every((value, index) => Math.abs(value - expected[index]) <= kTolerance);
+const untilFlies = (page, step = 0) =>
+  waitFor(`a step after ${step}`, () => page.evaluate((last) => (window.slsView?.state().step ?? 0) > last, step));
 
-const chromium = await startBrowser({ flags: kLean });
-
-/** Starts a server, runs `body` with the page in a tab, ends both. Expects no console error and no request to another server. */
-async function withPage(serverOptions, tabOptions, body, { mayWarn = false, hash = "", browser = chromium.browser } = {}) {
-  const server = await startFakeServer({ page: html, ...serverOptions });
-  const { page, errors, requests, close } = await open(browser, tabOptions);
+/** Starts a viewer, runs `body` with its page in a tab, ends both. Expects no other error in the console than `expected`,
+ *  and no request to another server. */
+async function withPage(flags, tab, body, { on = flight, hash = "", browser = chromium.browser, expected = /^$/ } = {}) {
+  const viewer = await on.startViewer(...flags);
+  const { page, errors, requests, close } = await open(browser, tab);
   try {
-    await page.goto(server.url + hash, { waitUntil: "load" });
-    await body(page, server);
-    if (!mayWarn) assert.deepEqual(errors, []);
-    for (const url of requests) assert.ok(url.startsWith(server.url) || url.startsWith("data:"), `foreign request: ${url}`);
+    await page.goto(viewer.url + hash);
+    await body(page, { viewer, requests });
+    assert.deepEqual(errors.filter((text) => !expected.test(text)), []);
+    for (const url of requests)
+      assert.ok(url.startsWith("data:") || new URL(url).host === new URL(viewer.url).host, `foreign request: ${url}`);
   } finally {
     await close();
-    await server.stop();
+    await viewer.stop();
   }
+}
+
+/** Clicks as a user does: on a button that can be pressed. Waits for the reply, which must say that the request was carried out. */
+async function press(page, action, button = `[data-action=${action}]`) {
+  await waitFor(`${action} can be pressed`, () => page.$eval(`[data-action=${action}]`, ({ disabled, hidden }) => !disabled && !hidden));
+  await page.click(button);
+  await expectDone(page, action);
+}
+async function expectDone(page, action) {
+  const reply = await waitFor(`reply to ${action}`, () =>
+    page.$eval("#reply", ({ textContent }, word) => new RegExp(`^${word} (done|refused|not)`).test(textContent) && textContent, action));
+  assert.match(reply, /^\w+ done at step \d+$/);
+}
+async function stepOn(page, count) {
+  const last = flight.status().step + count;
+  await page.$eval("#bar input[type=number]", (field, value) => (field.value = value), String(count));
+  await press(page, "step");
+  await waitFor(`${count} steps`, () => flight.status().step === last);
+}
+
+/** The recorded positions of quadrotor and load at `step`; nothing if that row is not on the disk yet. */
+function readRecorded(step) {
+  const [header, ...rows] = readFileSync(join(flight.folder, "recording/state.csv"), "utf8").trimEnd().split("\n").map((line) => line.split(","));
+  const row = rows.find((fields) => Number(fields[header.indexOf("step")]) === step);
+  const read = (part) => ["x", "y", "z"].map((axis) => Number(row[header.indexOf(`${part}_${axis}_m`)]));
+  return row && { quad: read("quad"), load: read("load") };
 }
 
 /**
@@ -44,147 +77,144 @@ function projectFlat({ mode, target_m: [tx, ty, tz], height_m, area }, [x, y, z]
   return [area.left + area.width / 2 + right * scale, area.top + area.height / 2 - up * scale];
 }
 
-const tests = {
-  async "pixels show quadrotor and load where the closed form has them"() {
-    await withPage({}, {}, async (page, server) => {
-      await untilFlies(page);
-      const step = 500;
-      server.freeze(step);
-      await waitFor("the frozen step", async () => (await state(page)).step === step);
-      for (const mode of ["top", "side"]) {
-        await page.click(`[data-camera=${mode}]`);
-        const frames = await page.evaluate(() => window.slsView.frames());
-        await page.evaluate(() => window.slsView.redraw());
-        await waitFor("a new frame", async () => (await page.evaluate(() => window.slsView.frames())) > frames);
-        const camera = await page.evaluate(() => window.slsView.camera());
-        const png = await page.screenshot({ path: join(folder, `${mode}.png`) });
-        const points = [calcQuad(0, step * 0.004, 1), calcLoad(0, step * 0.004, 1)];
-        const [quad, load] = await readPixels(chromium.browser, png, points.map((point) => projectFlat(camera, point)));
-        // From above the quadrotor hides the load.
-        assert.ok(isColour(quad, kQuad), `${mode}: quadrotor: expected ${kQuad}, got ${quad}`);
-        if (mode === "side") assert.ok(isColour(load, kLoad), `${mode}: load: expected ${kLoad}, got ${load}`);
-      }
-    });
-  },
-
-  async "buttons and keys ask the server, and replies are shown"() {
-    await withPage({}, {}, async (page, server) => {
-      await untilFlies(page);
-      await page.click("[data-action=pause]");
-      await waitFor("phase paused", async () => (await state(page)).phase === "paused");
-      await page.click("[data-action=step]");
-      await waitFor("reply to step", () => page.$eval("#reply", ({ textContent }) => /step done/.test(textContent)));
-      await page.focus("#scene");
-      await page.keyboard.press("Space");
-      await waitFor("phase running", async () => (await state(page)).phase === "running");
-      await page.click("[data-action=stop]");
-      await page.click("#confirm-no");
-      await page.click("[data-action=reset]");
-      await page.click("#confirm-yes");
-      await waitFor("reset", () => server.control.some(({ action }) => action === "reset"));
-      const actions = server.control.filter(({ op }) => op === "control").map(({ action, steps }) => [action, steps]);
-      assert.deepEqual(actions, [["pause", 0], ["step", 1], ["resume", 0], ["reset", 0]]);
-    });
-  },
-
-  async "a connection that is lost is found again without reload, and the picture stays"() {
-    const first = await startFakeServer({ page: html });
-    const { port } = first;
-    const { page, close } = await open(chromium.browser);
-    try {
-      await page.goto(first.url);
-      await untilFlies(page);
-      await page.evaluate(() => (window.isSamePage = true));
-      await first.stop();
-      await waitFor("banner", () => page.$eval("#banner", ({ hidden, textContent }) => !hidden && /lost/.test(textContent)));
-      assert.equal(await page.$eval("[data-action=pause]", ({ disabled }) => disabled), true);
-      assert.ok(await page.evaluate(() => window.slsView.projection(0)));
-      await page.screenshot({ path: join(folder, "lost.png") });
-      const second = await startFakeServer({ page: html, port });
-      try {
-        await waitFor("connection", async () => (await state(page)).is_connected);
-        await waitFor("no banner", () => page.$eval("#banner", ({ hidden }) => hidden));
-        assert.equal(await page.evaluate(() => window.isSamePage), true);
-      } finally {
-        await second.stop();
-      }
-    } finally {
-      await close();
-    }
-  },
-
-  async "a fleet of 100 is drawn, and a click chooses a vehicle"() {
-    await withPage({ vehicles: 100 }, {}, async (page, server) => {
-      await untilFlies(page);
-      await page.click("[data-camera=top]");
-      server.freeze(400);
-      await waitFor("the frozen step", async () => (await state(page)).step === 400);
-      const place = await page.evaluate(() => window.slsView.projection(42).quad);
-      await page.mouse.click(...place);
-      await waitFor("vehicle 42", async () => (await state(page)).selected === 42);
-      await waitFor("select", () => server.control.some(({ op, vehicle_id }) => op === "select" && vehicle_id === 42));
-      await page.screenshot({ path: join(folder, "fleet.png") });
-    });
-  },
-
-  async "no flight: the page says what is missing, with the command"() {
-    await withPage({ hasRun: false }, {}, async (page) => {
-      await waitFor("command", () => page.$eval("#command", ({ textContent }) => textContent.startsWith("./sls run")));
-      await page.screenshot({ path: join(folder, "no_flight.png") });
-    });
-  },
-
-  async "no WebGL: a table of positions and the plots"() {
-    const flat = await startBrowser({ flags: [...kLean, "--disable-3d-apis"] });
-    const check = async (page) => {
-      await untilFlies(page);
-      assert.equal((await state(page)).has_scene, false);
-      await waitFor("numbers in the table", () => page.$eval("#table tbody td:nth-child(2)", ({ textContent }) => /\d/.test(textContent)));
-      await waitFor("a plot", () => page.$("#plots canvas"));
-      await page.screenshot({ path: join(folder, "no_webgl.png") });
-    };
-    await withPage({ vehicles: 3 }, {}, check, { mayWarn: true, browser: flat.browser }).finally(flat.stop);
-  },
-
-  async "without the token there are no buttons; it leaves the address and never reaches the server over HTTP"() {
-    const token = "a-token-of-the-test-0123";
-    await withPage({ token }, {}, async (page, server) => {
-      await waitFor("buttons", () => page.$("[data-action=pause]"));
-      assert.equal(page.url(), server.url);
-      assert.ok(server.requests.every((path) => !path.includes(token)));
-    }, { hash: `#token=${token}` });
-    await withPage({ token }, {}, async (page) => {
-      await waitFor("reason", () => page.$eval("#bar", ({ textContent }) => /expected a token/.test(textContent)));
-      assert.equal(await page.$("[data-action]"), null);
-      await page.type("#bar input", token);
-      await page.click("#bar button");
-      await waitFor("buttons", () => page.$("[data-action=pause]"));
-    });
-    await withPage({ readOnly: true }, {}, async (page) => {
-      await waitFor("reason", () => page.$eval("#bar", ({ textContent }) => /--read-only/.test(textContent)));
-      assert.equal(await page.$("[data-action]"), null);
-    });
-  },
-
-  async "a phone shows everything without scrolling sideways, and every control has a name"() {
-    await withPage({}, { width: 390, height: 844, touch: true, scheme: "light" }, async (page) => {
-      await untilFlies(page);
-      assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= 390);
-      const nameless = await page.$$eval("button, select, input, summary", (all) =>
-        all.filter((item) => !(item.getAttribute("aria-label") || item.textContent.trim() || item.labels?.length)).length);
-      assert.equal(nameless, 0);
-      await page.screenshot({ path: join(folder, "phone.png") });
-    });
-  },
-};
-
-try {
-  for (const [name, test] of Object.entries(tests)) {
-    if (!name.includes(word)) continue;
-    const began = performance.now();
-    await test();
-    console.log(`ok ${name} (${((performance.now() - began) / 1000).toFixed(1)} s)`);
+/** The part whose colour a picture of the paused step does not show where the recording has it; nothing if it shows both. */
+async function findMissing(page, mode) {
+  await page.click(`[data-camera=${mode}]`);
+  await page.click("#fit");
+  const frames = await page.evaluate(() => window.slsView.frames());
+  await page.evaluate(() => window.slsView.redraw());
+  await waitFor("a new frame", async () => (await page.evaluate(() => window.slsView.frames())) > frames);
+  const { step } = await state(page);
+  const recorded = await waitFor("the recorded step", () => readRecorded(step));
+  const camera = await page.evaluate(() => window.slsView.camera());
+  const png = await page.screenshot();
+  // From above the quadrotor hides the load.
+  for (const part of mode === "top" ? ["quad"] : ["quad", "load"]) {
+    const [x, y] = projectFlat(camera, recorded[part]);
+    // A line of the path or the trail may cross the body, but not most of these places on it.
+    const colours = await readPixels(chromium.browser, png, kPlaces.map(([right, down]) => [x + right, y + down]));
+    const right = colours.filter((colour) => colour.every((value, index) => Math.abs(value - kColours[part][index]) <= kTolerance));
+    if (right.length < 3) return `${mode}: ${part} at ${[x, y]}: expected ${kColours[part]}, got ${colours.join("  ")}`;
   }
-} finally {
-  await chromium.stop();
+  return null;
 }
+
+test("buttons and keys pause, step and resume the run, and pixels show where it is", async () => {
+  await withPage([], {}, async (page) => {
+    await untilFlies(page, 250);
+    await press(page, "pause");
+    await waitFor("sim_ctl: paused", () => flight.status().phase === "paused");
+    await waitFor("page: paused", async () => (await state(page)).phase === "paused");
+    await stepOn(page, 7);
+    for (const mode of ["top", "side"]) {
+      // Where path, trail and reference cross, lines cover most of a body: then a later step shows it.
+      let missing = await findMissing(page, mode);
+      if (missing) {
+        await stepOn(page, 100);
+        missing = await findMissing(page, mode);
+      }
+      assert.equal(missing, null);
+    }
+    await page.focus("#scene");
+    await page.keyboard.press("Space");
+    await expectDone(page, "resume");
+    await waitFor("sim_ctl: running", () => flight.status().phase === "running");
+    const { run_id } = flight.status();
+    await page.click("[data-action=stop]");
+    await page.click("#confirm-no");
+    await page.click("[data-action=reset]");
+    await press(page, "reset", "#confirm-yes");
+    await waitFor("another run", () => flight.status().run_id !== run_id);
+  });
+});
+
+test("a connection that is lost is found again without reload, and the picture stays", async () => {
+  await withPage([], {}, async (page, { viewer }) => {
+    await untilFlies(page);
+    await page.evaluate(() => (window.isSamePage = true));
+    await viewer.stop();
+    await waitFor("banner", () => page.$eval("#banner", ({ hidden, textContent }) => !hidden && /lost/.test(textContent)));
+    assert.equal(await page.$eval("[data-action=pause]", ({ disabled }) => disabled), true);
+    assert.ok(await page.evaluate(() => window.slsView.projection(0)));
+    const { step } = await state(page);
+    const second = await flight.startViewer("--port", viewer.port);
+    try {
+      await untilFlies(page, step);
+      assert.doesNotMatch(await page.$eval("#banner", ({ hidden, textContent }) => (hidden ? "" : textContent)), /lost/);
+      assert.equal(await page.evaluate(() => window.isSamePage), true);
+    } finally {
+      await second.stop();
+    }
+  }, { expected: /WebSocket|ERR_CONNECTION/ });
+});
+
+test("a fleet of 100 is drawn, and a click chooses a vehicle", async () => {
+  const fleet = await startFlight({ base: "fleet", change: (text) => text.replace("vehicles: 10", "vehicles: 100"), rtf: 0.05 });
+  await withPage([], {}, async (page) => {
+    await untilFlies(page);
+    await page.evaluate(() => {
+      const { send } = WebSocket.prototype;
+      window.sent = [];
+      WebSocket.prototype.send = function (text) {
+        window.sent.push(JSON.parse(text));
+        send.call(this, text);
+      };
+    });
+    await press(page, "pause");
+    await page.click("[data-camera=top]");
+    await page.mouse.click(...await waitFor("its place", () => page.evaluate(() => window.slsView.projection(42)?.quad)));
+    await waitFor("vehicle 42", async () => (await state(page)).selected === 42);
+    assert.ok(await page.evaluate(() => window.sent.some(({ op, vehicle_id }) => op === "select" && vehicle_id === 42)));
+  }, { on: fleet }).finally(fleet.stop);
+});
+
+test("no flight: the page says what is missing, with the command", async () => {
+  const nothing = await startFlight({ hasFlight: false });
+  await withPage([], {}, async (page) => {
+    await waitFor("command", () => page.$eval("#command", ({ textContent }) => textContent.startsWith("./sls run")));
+  }, { on: nothing }).finally(nothing.stop);
+});
+
+test("no WebGL: a table of positions and the plots", async () => {
+  const flat = await startBrowser({ flags: [...kLean, "--disable-3d-apis"] });
+  const check = async (page) => {
+    await untilFlies(page);
+    assert.equal((await state(page)).has_scene, false);
+    await waitFor("numbers in the table", () => page.$eval("#table tbody td:nth-child(2)", ({ textContent }) => /\d/.test(textContent)));
+    await waitFor("a plot", () => page.$("#plots canvas"));
+  };
+  await withPage([], {}, check, { expected: /./, browser: flat.browser }).finally(flat.stop);
+});
+
+test("without the token there are no buttons; it leaves the address and is in no request", async () => {
+  const token = "a-token-of-the-test-0123";
+  const file = join(flight.folder, "token");
+  writeFileSync(file, token, { mode: 0o600 });
+  await withPage(["--token-file", file], {}, async (page, { viewer, requests }) => {
+    await waitFor("buttons", () => page.$("[data-action=pause]"));
+    assert.equal(page.url(), viewer.url);
+    assert.ok(requests.some((url) => url.startsWith("ws:")));
+    assert.deepEqual(requests.filter((url) => url.includes(token)), []);
+  }, { hash: `#token=${token}` });
+  await withPage(["--token-file", file], {}, async (page) => {
+    await waitFor("reason", () => page.$eval("#bar", ({ textContent }) => /expected a token/.test(textContent)));
+    assert.equal(await page.$("[data-action]"), null);
+    await page.type("#bar input", token);
+    await page.click("#bar button");
+    await waitFor("buttons", () => page.$("[data-action=pause]"));
+  });
+  await withPage(["--read-only"], {}, async (page) => {
+    await waitFor("reason", () => page.$eval("#bar", ({ textContent }) => /--read-only/.test(textContent)));
+    assert.equal(await page.$("[data-action]"), null);
+  });
+});
+
+test("a phone shows everything without scrolling sideways, and every control has a name", async () => {
+  await withPage([], { width: 390, height: 844, touch: true, scheme: "light" }, async (page) => {
+    await untilFlies(page);
+    assert.ok((await page.evaluate(() => document.documentElement.scrollWidth)) <= 390);
+    const nameless = await page.$$eval("button, select, input, summary", (all) =>
+      all.filter((item) => !(item.getAttribute("aria-label") || item.textContent.trim() || item.labels?.length)).length);
+    assert.equal(nameless, 0);
+  });
+});

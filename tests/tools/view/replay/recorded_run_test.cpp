@@ -314,7 +314,7 @@ TEST_F(RecordedRunTest, DamageIsNamedInOneLine) {
             std::string::npos);
   EXPECT_NE(damage("scenario.yaml",
                    [](const fs::path& file) { write_bytes(file, std::string(1 << 20, '#')); })
-                .find("expected a scenario of at most 32768 bytes"),
+                .find("expected at most 32768 bytes"),
             std::string::npos);
 }
 

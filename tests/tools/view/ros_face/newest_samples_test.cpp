@@ -15,11 +15,7 @@ Parameters make_parameters(const std::vector<std::uint32_t>& vehicle_ids) {
   Parameters parameters;
   parameters.run_id(kRun);
   parameters.period_ns(4'000'000);
-  for (const std::uint32_t id : vehicle_ids) {
-    VehicleParameters vehicle;
-    vehicle.vehicle_id(id);
-    parameters.vehicles().push_back(vehicle);
-  }
+  for (const std::uint32_t id : vehicle_ids) parameters.vehicles().emplace_back().vehicle_id(id);
   return parameters;
 }
 

@@ -149,6 +149,7 @@ TEST_F(ServerTest, RefusesBodies) {
   EXPECT_EQ(find_status(get("/", "Transfer-Encoding: chunked\r\n") + "5\r\nhello\r\n0\r\n\r\n"),
             413);
   EXPECT_EQ(find_status(get("/", "Content-Length: 18446744073709551615\r\n")), 413);
+  EXPECT_EQ(find_status("POST / HTTP/1.1\r\nHost: localhost\r\nContent-Length: 1\r\n\r\nx"), 413);
   EXPECT_EQ(ask(get("/", "Content-Length: 0\r\n")).second, "the page");
 }
 
@@ -187,19 +188,21 @@ TEST_F(ServerTest, RefusesForeignHostsAndOrigins) {
 
 // --- limits --------------------------------------------------------------------------------------
 
-TEST(ServerLimitsTest, EndsARequestThatComesByteByByte) {
+ServerOptions make_impatient_options() {
   ServerOptions options = test::make_options();
   options.limits.request_timeout_s = 0.3;
-  RunningServer server(options, test::add_echo_and_page);
+  return options;
+}
+
+TEST(ServerLimitsTest, EndsARequestThatComesByteByByte) {
+  RunningServer server(make_impatient_options(), test::add_echo_and_page);
   RawClient client(server.port());
   client.send("GET / HTTP/1.1\r\nX: ");
   EXPECT_TRUE(test::wait_until([&] { return !client.send("x"); })) << "the server never closed it";
 }
 
 TEST(ServerLimitsTest, EndsConnectionsThatSendNothing) {
-  ServerOptions options = test::make_options();
-  options.limits.request_timeout_s = 0.3;
-  RunningServer server(options, test::add_echo_and_page);
+  RunningServer server(make_impatient_options(), test::add_echo_and_page);
   RawClient fresh(server.port());
   EXPECT_TRUE(fresh.ends());
   RawClient used(server.port());
@@ -209,9 +212,7 @@ TEST(ServerLimitsTest, EndsConnectionsThatSendNothing) {
 }
 
 TEST(ServerLimitsTest, EndsConnectionsThatDoNotReadTheirAnswer) {
-  ServerOptions options = test::make_options();
-  options.limits.request_timeout_s = 0.3;
-  RunningServer server(options, [](Server& prepared) {
+  RunningServer server(make_impatient_options(), [](Server& prepared) {
     // The answers exceed the buffers of both ends; each is small enough for a short deadline.
     prepared.add_resource(
         "/large", {"text/plain", test::make_payload(std::string(100'000, 'x')), nullptr, ""});

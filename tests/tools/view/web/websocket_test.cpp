@@ -1,8 +1,6 @@
 /// WebSockets: negotiation, frames that break the protocol, permission to operate, the end.
 #include <gtest/gtest.h>
 
-#include <set>
-
 #include "tests/support/waiting.hpp"
 #include "tests/tools/view/web/running_server.hpp"
 #include "tests/tools/view/web/sessions.hpp"
@@ -250,19 +248,21 @@ TEST_F(WebSocketTest, ClosesAfterFiveWrongTokens) {
 
 // --- silence and the end -------------------------------------------------------------------------
 
-TEST(WebSocketEndTest, ClosesAClientThatDoesNotAnswerPings) {
+ServerOptions make_options_with_silence(double timeout_s) {
   ServerOptions options = test::make_options();
-  options.limits.silence_timeout_s = 0.4;
-  RunningServer server(options, test::add_echo_and_page);
+  options.limits.silence_timeout_s = timeout_s;
+  return options;
+}
+
+TEST(WebSocketEndTest, ClosesAClientThatDoesNotAnswerPings) {
+  RunningServer server(make_options_with_silence(0.4), test::add_echo_and_page);
   RawClient client = test::open_websocket(server.port(), "other");
   EXPECT_TRUE(client.ends());
   EXPECT_TRUE(test::wait_until([&] { return server->count_connections() == 0; }));
 }
 
 TEST(WebSocketEndTest, KeepsAClientThatAnswersPings) {
-  ServerOptions options = test::make_options();
-  options.limits.silence_timeout_s = 2;
-  RunningServer server(options, test::add_echo_and_page);
+  RunningServer server(make_options_with_silence(2), test::add_echo_and_page);
   RawClient client = test::open_websocket(server.port(), "other");
   const auto begin = std::chrono::steady_clock::now();
   while (std::chrono::steady_clock::now() - begin < std::chrono::seconds(5)) {
@@ -275,9 +275,7 @@ TEST(WebSocketEndTest, KeepsAClientThatAnswersPings) {
 }
 
 TEST(WebSocketEndTest, EndsAConnectionWhoseClientStaysAfterItsError) {
-  ServerOptions options = test::make_options();
-  options.limits.silence_timeout_s = 0.4;
-  RunningServer server(options, test::add_echo_and_page);
+  RunningServer server(make_options_with_silence(0.4), test::add_echo_and_page);
   RawClient client = test::open_websocket(server.port(), "other");
   client.send(to_bytes({3, "x"}));
   EXPECT_TRUE(test::wait_until([&] { return server->count_connections() == 0; }))

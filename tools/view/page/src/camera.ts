@@ -1,5 +1,5 @@
 /** The camera: an orbit about a target, or a true-to-scale drawing from above or from the side. */
-import { OrthographicCamera, PerspectiveCamera, Vector3, type Box3, type Camera } from "three";
+import { MathUtils, OrthographicCamera, PerspectiveCamera, Vector3, type Box3, type Camera } from "three";
 import type { CameraMode } from "./types";
 
 const kFieldOfView = (40 * Math.PI) / 180;
@@ -48,13 +48,12 @@ export class View {
     box.getCenter(this.target);
     const size = box.getSize(new Vector3());
     const aspect = this.width / this.height;
-    if (this.mode === "top" || this.mode === "side") {
+    if (this.isFlat) {
       const [across, up] = this.mode === "top" ? [size.y, size.x] : [size.x, size.z];
-      this.setHeight(1.25 * Math.max(up, across / aspect, 1));
-      return;
+      return this.setDistance((0.625 * Math.max(up, across / aspect, 1)) / Math.tan(kFieldOfView / 2));
     }
     const radius = Math.max(0.5 * size.length(), 0.8);
-    this.distance = this.clamp(radius / Math.sin(kFieldOfView / 2) / Math.min(1, aspect * 1.1));
+    this.setDistance(radius / Math.sin(kFieldOfView / 2) / Math.min(1, aspect * 1.1));
     // A wide, flat fleet is seen better from higher up than a single flight.
     this.elevation = size.z < 0.2 * Math.hypot(size.x, size.y) ? 0.55 : 0.36;
   }
@@ -62,7 +61,7 @@ export class View {
   rotate(dx: number, dy: number): void {
     if (this.isFlat) return this.pan(dx, dy);
     this.azimuth -= dx * 0.006;
-    this.elevation = Math.min(kMostElevation, Math.max(kLeastElevation, this.elevation + dy * 0.006));
+    this.elevation = MathUtils.clamp(this.elevation + dy * 0.006, kLeastElevation, kMostElevation);
   }
 
   pan(dx: number, dy: number): void {
@@ -74,7 +73,7 @@ export class View {
   }
 
   zoom(factor: number): void {
-    this.distance = this.clamp(this.distance * factor);
+    this.setDistance(this.distance * factor);
   }
 
   /** Updates the cameras from the fields above. */
@@ -116,12 +115,8 @@ export class View {
     return [((seen.x + 1) / 2) * this.width, ((1 - seen.y) / 2) * this.height];
   }
 
-  private setHeight(metres: number): void {
-    this.distance = this.clamp(metres / 2 / Math.tan(kFieldOfView / 2));
-  }
-
-  private clamp(distance: number): number {
-    return Math.min(kMostDistance, Math.max(kLeastDistance, distance));
+  private setDistance(distance: number): void {
+    this.distance = MathUtils.clamp(distance, kLeastDistance, kMostDistance);
   }
 }
 
@@ -168,7 +163,7 @@ export function control(element: HTMLElement, view: View, changed: () => void, c
     "wheel",
     (event) => {
       event.preventDefault();
-      view.zoom(Math.exp(Math.max(-0.4, Math.min(0.4, event.deltaY * (event.deltaMode === 1 ? 0.04 : 0.0015)))));
+      view.zoom(Math.exp(MathUtils.clamp(event.deltaY * (event.deltaMode === 1 ? 0.04 : 0.0015), -0.4, 0.4)));
       changed();
     },
     { passive: false },

@@ -1,4 +1,12 @@
-const readColour = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
+const root = document.documentElement;
+
+/** The colour of a custom property; a theme chooses between the two of `light-dark`. */
+function readColour(name: string): string {
+  root.style.color = `var(--${name})`;
+  const { color } = getComputedStyle(root);
+  root.style.color = "";
+  return color;
+}
 
 /**
  * Colours of the vehicle's parts (python/sls/colours.css): the same in dark and light, unlit, so that the colour of a
@@ -9,22 +17,7 @@ export const kLoadColour = readColour("load");
 export const kReferenceColour = readColour("reference");
 
 /** Colours of the page that the theme gives: custom properties of style.css. */
-export interface Theme {
-  background: string;
-  grid: string;
-  gridMajor: string;
-  text: string;
-  muted: string;
-  accent: string;
-  frame: string;
-  outline: string;
-  plotGrid: string;
-  series: string[];
-  fault: string;
-  event: string;
-}
-
-export function readTheme(): Theme {
+export function readTheme() {
   return {
     background: readColour("scene"),
     grid: readColour("grid"),
@@ -36,13 +29,12 @@ export function readTheme(): Theme {
     outline: readColour("outline"),
     plotGrid: readColour("plot-grid"),
     series: [1, 2, 3, 4, 5, 6, 7, 8].map((index) => readColour(`series-${index}`)),
-    fault: readColour("fault"),
-    event: readColour("muted"),
+    bad: readColour("bad"),
   };
 }
+export type Theme = ReturnType<typeof readTheme>;
 
 /** Calls `act` when the theme changes between dark and light. */
 export function onThemeChange(act: () => void): void {
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", act);
-  new MutationObserver(act).observe(document.documentElement, { attributeFilter: ["data-theme"] });
+  new MutationObserver(act).observe(root, { attributeFilter: ["data-theme"] });
 }

@@ -34,7 +34,7 @@ export function makeIcon(path: string): SVGSVGElement {
 }
 
 /** A group of buttons with one choice. Arrow keys move the choice, as in a group of radio buttons. */
-export function makeChoice(group: HTMLElement, choose: (button: HTMLButtonElement) => void): (value: HTMLElement) => void {
+export function makeChoice(group: HTMLElement, choose: (button: HTMLButtonElement) => void): void {
   const buttons = [...group.querySelectorAll<HTMLButtonElement>("[role=radio]")];
   const mark = (chosen: HTMLElement) => {
     for (const button of buttons) {
@@ -57,7 +57,6 @@ export function makeChoice(group: HTMLElement, choose: (button: HTMLButtonElemen
     next.focus();
     next.click();
   });
-  return mark;
 }
 
 /** Asks the user to confirm an action that cannot be undone. */

@@ -3,6 +3,7 @@ import {
   BackSide,
   BufferAttribute,
   BufferGeometry,
+  CircleGeometry,
   Color,
   DataTexture,
   DoubleSide,
@@ -16,6 +17,7 @@ import {
   Vector3,
   type Camera,
 } from "three";
+import { mergeGeometries } from "three/examples/jsm/utils/BufferGeometryUtils.js";
 import { calcCablePoints, calcColour, findLoad, hasLoad, kCableParts } from "./cables";
 import { kLoadColour, kReferenceColour, type Theme } from "./colours";
 import {
@@ -23,12 +25,10 @@ import {
   makeAirframe,
   makeBallGeometry,
   makeBladeGeometry,
-  makeDiscGeometry,
   makeFrameGeometry,
   makeLoadGeometry,
   makeReticleGeometry,
   makeRodGeometry,
-  makeShadowGeometry,
   paint,
   type Airframe,
 } from "./parts";
@@ -43,23 +43,28 @@ const kLeastBladePixels = 16;
 const kLeastLoadPixels = 4.5;
 
 /** Position and attitude of one vehicle, in scene coordinates. */
-export interface Body {
-  readonly vehicle: Vehicle;
+export class Body {
   readonly airframe: Airframe;
   readonly loadRadius: number;
-  readonly quad: Vector3;
-  /** Of the load, or of the end of the cable. */
-  readonly load: Vector3;
-  /** Of the load. */
-  readonly centre: Vector3;
-  readonly loadRotation: Quaternion;
   readonly hasLoad: boolean;
-  cable: Cable | null;
-  readonly reference: Vector3;
-  readonly rotation: Quaternion;
-  hasPose: boolean;
-  hasReference: boolean;
-  rotorRate: number;
+  readonly quad = new Vector3();
+  /** Of the load, or of the end of the cable. */
+  readonly load = new Vector3();
+  /** Of the load. */
+  readonly centre = new Vector3();
+  readonly loadRotation = new Quaternion();
+  readonly reference = new Vector3();
+  readonly rotation = new Quaternion();
+  cable: Cable | null = null;
+  hasPose = false;
+  hasReference = false;
+  rotorRate = NaN;
+
+  constructor(run: Run, readonly vehicle: Vehicle, place: number) {
+    this.airframe = makeAirframe(vehicle);
+    this.loadRadius = calcLoadRadius(run, vehicle);
+    this.hasLoad = hasLoad(run, place);
+  }
 }
 
 /** The same part of all vehicles: one mesh with `count` copies of the geometry, whose vertices look up the matrix of
@@ -113,15 +118,9 @@ class Part {
 /** `count` copies of a geometry, with the number of the copy in attribute `copy`. */
 function repeat(geometry: BufferGeometry, count: number): BufferGeometry {
   const source = geometry.index ? geometry.toNonIndexed() : geometry;
+  source.deleteAttribute("normal").deleteAttribute("uv"); // nothing is lit
   const vertices = source.getAttribute("position").count;
-  const result = new BufferGeometry();
-  for (const name of ["position", "color"]) {
-    const attribute = source.getAttribute(name);
-    if (!attribute) continue;
-    const values = new Float32Array(count * attribute.array.length);
-    for (let copy = 0; copy < count; ++copy) values.set(attribute.array, copy * attribute.array.length);
-    result.setAttribute(name, new BufferAttribute(values, attribute.itemSize, attribute.normalized));
-  }
+  const result = mergeGeometries(new Array<BufferGeometry>(count).fill(source));
   const copies = new Float32Array(count * vertices);
   for (let copy = 0; copy < count; ++copy) copies.fill(copy, copy * vertices, (copy + 1) * vertices);
   result.setAttribute("copy", new BufferAttribute(copies, 1));
@@ -131,7 +130,6 @@ function repeat(geometry: BufferGeometry, count: number): BufferGeometry {
 export class Fleet {
   readonly group = new Group();
   readonly bodies: Body[];
-  private readonly places = new Map<number, number>();
   private readonly frames: { part: Part; outline: Part; members: number[] }[] = [];
   private readonly discs: Part;
   private readonly blades: Part;
@@ -154,28 +152,12 @@ export class Fleet {
     isMany: boolean,
     isCoarse: boolean,
   ) {
-    this.bodies = run.vehicles.map((vehicle, place) => ({
-      vehicle,
-      airframe: makeAirframe(vehicle),
-      loadRadius: calcLoadRadius(run, vehicle),
-      quad: new Vector3(),
-      load: new Vector3(),
-      centre: new Vector3(),
-      loadRotation: new Quaternion(),
-      hasLoad: hasLoad(run, place),
-      cable: null,
-      reference: new Vector3(),
-      rotation: new Quaternion(),
-      hasPose: false,
-      hasReference: false,
-      rotorRate: NaN,
-    }));
-    this.bodies.forEach((body, place) => this.places.set(body.vehicle.id, place));
+    this.bodies = run.vehicles.map((vehicle, place) => new Body(run, vehicle, place));
     const opacity = index === 1 ? 0.38 : 1;
     const count = this.bodies.length;
     const rotors = this.bodies.reduce((sum, { airframe }) => sum + airframe.rotors.length, 0);
 
-    this.shadows = this.add(makeShadowGeometry(isCoarse), count, 1, { colour: "outline", opacity: 0.22 * opacity });
+    this.shadows = this.add(new CircleGeometry(1, isCoarse ? 8 : 20), count, 1, { colour: "outline", opacity: 0.22 * opacity });
     for (const members of this.groupByAirframe().values()) {
       const { airframe } = this.bodies[members[0]!]!;
       const geometry = makeFrameGeometry(airframe, isCoarse);
@@ -193,7 +175,7 @@ export class Fleet {
     for (const { mesh } of [this.shadows, this.outlines]) mesh.visible = !isCoarse;
     this.loads = this.add(makeBallGeometry(isCoarse), count, 4, { fixed: kLoadColour, opacity });
     this.blades = this.add(makeBladeGeometry(), rotors, 5, { colour: "frame", side: DoubleSide, opacity: 0.85 * opacity });
-    this.discs = this.add(makeDiscGeometry(isCoarse), rotors, 6, {
+    this.discs = this.add(new CircleGeometry(1, isCoarse ? 9 : 24), rotors, 6, {
       colour: "frame",
       side: DoubleSide,
       opacity: (isMany ? 0.3 : 0.16) * opacity,
@@ -204,8 +186,7 @@ export class Fleet {
   }
 
   find(vehicleId: number): Body | undefined {
-    const place = this.places.get(vehicleId);
-    return place === undefined ? undefined : this.bodies[place];
+    return this.bodies.find(({ vehicle }) => vehicle.id === vehicleId);
   }
 
   setTheme(theme: Theme): void {

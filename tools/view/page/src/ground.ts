@@ -19,17 +19,14 @@ export interface Extent {
 export class Ground {
   readonly lines = new LineSegments(new BufferGeometry(), new LineBasicMaterial({ vertexColors: true, toneMapped: false }));
   extent: Extent = { left: -5, right: 5, back: -5, front: 5, step: 1, height: 0, major: 5 };
-  private theme: Theme;
 
-  constructor(theme: Theme) {
-    this.theme = theme;
+  constructor(private theme: Theme) {
     this.lines.frustumCulled = false;
-    this.lines.renderOrder = 0;
     this.build();
   }
 
   /** Makes the ground at this height cover this area, in scene coordinates, with a margin. */
-  cover(minimum: Vector3, maximum: Vector3, height: number): boolean {
+  cover(minimum: Vector3, maximum: Vector3, height: number): void {
     const size = Math.max(maximum.x - minimum.x, maximum.y - minimum.y, 2);
     const step = size <= 24 ? 1 : size <= 120 ? 5 : 50;
     const margin = Math.max(3 * step, 0.35 * size);
@@ -42,10 +39,9 @@ export class Ground {
       height,
       major: step === 5 ? 2 : 5,
     };
-    if (JSON.stringify(extent) === JSON.stringify(this.extent)) return false;
+    if (JSON.stringify(extent) === JSON.stringify(this.extent)) return;
     this.extent = extent;
     this.build();
-    return true;
   }
 
   setTheme(theme: Theme): void {

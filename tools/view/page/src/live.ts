@@ -36,7 +36,6 @@ class Live {
   private socket: WebSocket | null = null;
   private wait = kFirstWait;
   private token = takeToken();
-  private hello: Hello | null = null;
   private run: Run | null = null;
   private status: Status | null = null;
   private newest: Poses | null = null;
@@ -58,7 +57,7 @@ class Live {
     );
     shell.onSelect((vehicleId) => {
       if (this.run) shell.plots.setRun(this.run);
-      this.showMarks();
+      shell.plots.setMarks(this.marks);
       this.send({ op: "select", vehicle_id: vehicleId });
     });
     shell.scene?.onDrawn(() => this.noteFrame());
@@ -66,8 +65,11 @@ class Live {
     clearEvents();
     showPhase("connecting");
     setInterval(() => this.showPanels(), kPanelTime);
-    addEventListener("online", () => this.retryNow());
-    this.exposeMeasurements();
+    addEventListener("online", () => {
+      this.wait = kFirstWait;
+      this.retry();
+    });
+    shell.expose({ state: () => this.getState() });
     this.connect();
   }
 
@@ -103,11 +105,6 @@ class Live {
     if (this.socket === null) this.connect();
   }
 
-  private retryNow(): void {
-    this.wait = kFirstWait;
-    this.retry();
-  }
-
   private send(message: object): void {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
   }
@@ -122,7 +119,6 @@ class Live {
   private receiveText(message: Message): void {
     switch (message.op) {
       case "hello":
-        this.hello = message;
         this.bar.setHello(message);
         break;
       case "run":
@@ -179,17 +175,13 @@ class Live {
     this.events.add(key);
     addEvent(event);
     this.marks = [...this.marks.slice(1 - kMostMarks), { time: event.sim_time_s, text: event.text, kind: kindOf(event.text) }];
-    this.showMarks();
-  }
-
-  private showMarks(): void {
     this.shell.plots.setMarks(this.marks);
   }
 
   private receivePoses(poses: Poses): void {
     if (poses.runId !== this.run?.run_id) return;
     this.newest = poses;
-    this.shell.setPoses(poses.step, poses.simTime, poses.poses);
+    this.shell.setPoses(poses.simTime, poses.poses);
   }
 
   private receiveRows(data: ArrayBuffer): void {
@@ -229,36 +221,15 @@ class Live {
     showStatus(this.status, this.run, this.calcLatency(), this.shell.scene?.fps() ?? 0);
   }
 
-  /** For tests and benchmarks. */
-  private exposeMeasurements(): void {
-    const { scene } = this.shell;
-    Object.assign(window, {
-      slsView: {
-        latency: () => this.calcLatency(),
-        resetLatency: () => void (this.latencies.length = 0),
-        fps: () => scene?.fps() ?? 0,
-        redraw: () => scene?.invalidate(),
-        frames: () => scene?.frames() ?? 0,
-        projection: (vehicleId: number) => scene?.projection(vehicleId) ?? null,
-        camera: () => scene?.camera() ?? null,
-        state: () => ({
-          is_connected: this.socket?.readyState === WebSocket.OPEN,
-          run_id: this.run?.run_id ?? null,
-          phase: this.status?.phase ?? null,
-          step: this.newest?.step ?? null,
-          sim_time_s: this.newest?.simTime ?? null,
-          selected: this.shell.selected(),
-          may_operate: this.hello?.may_operate ?? null,
-          events: this.events.size,
-          has_scene: scene !== null,
-        }),
-        /** Positions of the newest step, frame W. */
-        pose: (vehicleId: number) => {
-          const pose = this.newest?.poses.find((candidate) => candidate.vehicleId === vehicleId);
-          return pose ? { quad: [...Array.from(pose.quad)], load: [...Array.from(pose.load)] } : null;
-        },
-      },
-    });
+  private getState() {
+    return {
+      is_connected: this.socket?.readyState === WebSocket.OPEN,
+      phase: this.status?.phase ?? null,
+      step: this.newest?.step ?? null,
+      sim_time_s: this.newest?.simTime ?? null,
+      selected: this.shell.selected(),
+      has_scene: this.shell.scene !== null,
+    };
   }
 }
 

@@ -29,7 +29,6 @@ export class OperatorBar {
     private readonly ask: (id: number, action: Action, steps: number) => void,
     private readonly authenticate: (token: string) => void,
   ) {
-    this.reply.id = "reply";
     document.addEventListener("keydown", (event) => this.handleKey(event));
   }
 

@@ -111,11 +111,7 @@ export function showStatus(status: Status, run: Run | null, drawn: Latency, fps:
   const counters = Object.entries(status.counters).filter(([, value]) => value > 0);
   add("Counters", counters.map(([name, value]) => `${name.replaceAll("_", " ")} ${format(value)}`).join(" · "), "warn");
   showLines(lines);
-  showFacts(status);
   showParticipants(status.participants);
-}
-
-function showFacts(status: Status): void {
   const factor = status.real_time_factor > 0 ? `× ${status.real_time_factor.toFixed(2)}` : "";
   setText(find("facts"), [factor, `step ${format(status.step)}`].filter(Boolean).join(" · "));
 }
@@ -155,6 +151,6 @@ export function clearEvents(): void {
 }
 
 /** 12345 → "12 345" with narrow spaces. */
-export function format(value: number): string {
+function format(value: number): string {
   return String(value).replace(/\B(?=(\d{3})+$)/g, "\u202f");
 }

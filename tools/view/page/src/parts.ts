@@ -3,7 +3,6 @@ import {
   BoxGeometry,
   BufferAttribute,
   BufferGeometry,
-  CircleGeometry,
   Color,
   ConeGeometry,
   CylinderGeometry,
@@ -91,11 +90,6 @@ export function makeFrameGeometry({ rotors, radius }: Airframe, isCoarse: boolea
   return mergeGeometries(parts);
 }
 
-/** A disc with a rim; radius 1. */
-export function makeDiscGeometry(isCoarse: boolean): BufferGeometry {
-  return new CircleGeometry(1, isCoarse ? 9 : 24);
-}
-
 /** Two blades and the rim of their circle; radius 1. */
 export function makeBladeGeometry(): BufferGeometry {
   const blade = new BoxGeometry(1.9, 0.11, 0.02).toNonIndexed();
@@ -143,8 +137,4 @@ export function makeReticleGeometry(isCoarse: boolean): BufferGeometry {
     parts.push(tick.toNonIndexed());
   }
   return mergeGeometries(parts);
-}
-
-export function makeShadowGeometry(isCoarse: boolean): BufferGeometry {
-  return new CircleGeometry(1, isCoarse ? 8 : 20);
 }

@@ -1,6 +1,7 @@
 /** Plots quantities of one vehicle over time. Plots that are folded or out of view are not drawn. */
 import uPlot from "uplot";
 import { onThemeChange, readTheme, type Theme } from "./colours";
+import { make, setText } from "./dom";
 import { Samples, thin, thinToGrid } from "./samples";
 import { describePlots, type PlotDescription } from "./series";
 import type { Mark, Rows, Run, RunIndex } from "./types";
@@ -45,7 +46,10 @@ export class Plots {
     const descriptions = describePlots(run);
     this.samples = [new Samples(descriptions), new Samples(descriptions)];
     this.marks = [];
-    for (const panel of this.panels) this.destroy(panel);
+    for (const { root, plot } of this.panels) {
+      this.watcher.unobserve(root);
+      plot?.destroy();
+    }
     let place = 0;
     this.panels = descriptions.map((description) => {
       const panel = this.makePanel(description, place);
@@ -152,39 +156,20 @@ export class Plots {
   }
 
   private makePanel(description: PlotDescription, place: number): Panel {
-    const root = document.createElement("details");
-    root.className = "plot";
-    root.open = !this.folded.has(description.key);
-    const summary = document.createElement("summary");
-    const title = document.createElement("span");
-    title.className = "plot-title";
-    title.textContent = description.title;
-    const unit = document.createElement("span");
-    unit.className = "plot-unit";
-    unit.textContent = description.unit;
-    const legend = document.createElement("span");
-    legend.className = "legend";
-    const readouts = description.series.map(({ label }, index) => {
-      const item = document.createElement("span");
-      item.className = `legend-item series-${index + 1}`;
-      const value = document.createElement("span");
-      value.className = "legend-value";
-      const key = document.createElement("i");
-      key.className = `key dash-${index % 4}`;
-      item.append(key, label, value);
-      legend.append(item);
-      return value;
-    });
-    summary.append(title, unit, legend);
-    const body = document.createElement("div");
-    body.className = "plot-body";
-    body.setAttribute("role", "img");
-    body.setAttribute("aria-label", `${description.title} by simulated time, in ${description.unit}`);
-    root.append(summary, body);
+    const { key, title, unit, series } = description;
+    const readouts = series.map(() => make("span", { class: "legend-value" }));
+    const legend = make("span", { class: "legend" }, ...series.map(({ label }, index) =>
+      make("span", { class: `legend-item series-${index + 1}` },
+        make("i", { class: `key dash-${index % 4}` }), label, readouts[index]!)));
+    const summary = make("summary", {},
+      make("span", { class: "plot-title" }, title), make("span", { class: "plot-unit" }, unit), legend);
+    const body = make("div", { class: "plot-body", role: "img", "aria-label": `${title} by simulated time, in ${unit}` });
+    const root = make("details", { class: "plot" }, summary, body);
+    root.open = !this.folded.has(key);
     const panel: Panel = { description, place, root, body, readouts, plot: null, isVisible: false, isStale: true };
     root.addEventListener("toggle", () => {
-      if (root.open) this.folded.delete(description.key);
-      else this.folded.add(description.key);
+      if (root.open) this.folded.delete(key);
+      else this.folded.add(key);
       panel.isStale = true;
       this.schedule();
     });
@@ -213,7 +198,7 @@ export class Plots {
     });
     const indices = series.map((_, index) => index);
     const hasSecond = this.samples[1].count > 0;
-    const plot = new uPlot(
+    return new uPlot(
       {
         width: Math.max(120, panel.body.clientWidth),
         height: kPlotHeight,
@@ -232,7 +217,6 @@ export class Plots {
       [[], ...indices.map(() => []), ...(hasSecond ? indices.map(() => []) : [])] as unknown as uPlot.AlignedData,
       panel.body,
     );
-    return plot;
   }
 
   private seekAt(plot: uPlot): void {
@@ -251,8 +235,7 @@ export class Plots {
         const at = this.cursor === null ? samples.count - 1 : Math.min(samples.count - 1, samples.find(this.cursor));
         value = samples.values[panel.place + series]![at];
       }
-      const text = value === null || value === undefined || !Number.isFinite(value) ? "–" : format(value);
-      if (readout.textContent !== text) readout.textContent = text;
+      setText(readout, value === null || value === undefined || !Number.isFinite(value) ? "–" : format(value));
     });
   }
 
@@ -272,7 +255,7 @@ export class Plots {
     context.save();
     context.lineWidth = ratio;
     for (const mark of this.marks)
-      line(mark.time, mark.kind === "fault" ? this.theme.fault : this.theme.event, mark.kind === "fault" ? [] : [3 * ratio, 3 * ratio]);
+      line(mark.time, mark.kind === "fault" ? this.theme.bad : this.theme.muted, mark.kind === "fault" ? [] : [3 * ratio, 3 * ratio]);
     context.lineWidth = 1.5 * ratio;
     if (this.cursor !== null) line(this.cursor, this.theme.accent, []);
     context.restore();
@@ -305,11 +288,6 @@ export class Plots {
       panel.isStale = true;
     }
     this.schedule();
-  }
-
-  private destroy(panel: Panel): void {
-    this.watcher.unobserve(panel.root);
-    panel.plot?.destroy();
   }
 }
 

@@ -40,7 +40,6 @@ export function readPoses(message: ArrayBuffer): Poses {
     const numbers = new Float32Array(message, at + 8, size / 4 - 2);
     poses[i] = {
       vehicleId: view.getUint32(at, true),
-      kind: view.getUint32(at + 4, true),
       quad: numbers.subarray(0, 3),
       attitude: numbers.subarray(3, 7),
       load: numbers.subarray(7, 10),

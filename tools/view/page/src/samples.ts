@@ -20,7 +20,7 @@ export class Samples {
   append(rows: Rows): void {
     for (let i = 0; i < rows.time.length; ++i) {
       const time = rows.time[i]!;
-      if (this.count > 0 && time <= this.time[this.count - 1]!) this.cutAt(time);
+      if (this.count > 0 && time <= this.time[this.count - 1]!) this.count = this.find(time);
       if (this.count === this.time.length) this.makeRoom();
       const row = rows.values.subarray(i * rows.columns, (i + 1) * rows.columns);
       this.time[this.count] = time;
@@ -39,17 +39,7 @@ export class Samples {
 
   /** Index of the first sample at or after `time`. */
   find(time: number): number {
-    let [low, high] = [0, this.count];
-    while (low < high) {
-      const middle = (low + high) >> 1;
-      if (this.time[middle]! < time) low = middle + 1;
-      else high = middle;
-    }
-    return low;
-  }
-
-  private cutAt(time: number): void {
-    this.count = this.find(time);
+    return findFirst(this.time, this.count, time);
   }
 
   /** Grows the memory. At the limit, drops every second sample of the older half. */
@@ -69,6 +59,17 @@ export class Samples {
     }
     this.count -= half >> 1;
   }
+}
+
+/** Index of the first of `count` ascending times at or after `time`; `count` if there is none. */
+export function findFirst(times: Float64Array, count: number, time: number): number {
+  let [low, high] = [0, count];
+  while (low < high) {
+    const middle = (low + high) >> 1;
+    if (times[middle]! < time) low = middle + 1;
+    else high = middle;
+  }
+  return low;
 }
 
 /** A window of samples with at most two per bucket (pixel): its least and its greatest value. */

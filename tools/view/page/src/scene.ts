@@ -10,8 +10,6 @@ import { Overlay } from "./overlay";
 import { Trails } from "./trails";
 import type { CameraMode, Pose, Run, RunIndex, Trail } from "./types";
 
-export { toScene } from "./frames";
-
 const kManyVehicles = 10; // more vehicles are drawn without smooth edges
 const kSlowFrame = 40; // ms between frames above which fewer pixels are drawn
 const kQuickFrame = 22;
@@ -26,13 +24,6 @@ interface Layer {
   trails: Trails;
   path: Line;
   isFitted: boolean;
-}
-
-export interface Projection {
-  /** CSS pixels of the page. */
-  quad: [number, number];
-  load: [number, number];
-  reference: [number, number] | null;
 }
 
 export class Scene {
@@ -95,7 +86,7 @@ export class Scene {
     this.fit();
   }
 
-  setPoses(_step: number, simTime: number, poses: readonly Pose[], index: RunIndex = 0): void {
+  setPoses(simTime: number, poses: readonly Pose[], index: RunIndex = 0): void {
     const layer = this.layers[index];
     if (!layer) return;
     layer.fleet.setPoses(simTime, poses);
@@ -115,17 +106,6 @@ export class Scene {
   /** Replaces the trail that poses have left: for a jump in time of a recording. */
   setTrail(vehicleId: number, trail: Trail, index: RunIndex = 0): void {
     this.layers[index]?.trails.replace(vehicleId, trail);
-    this.invalidate();
-  }
-
-  /** Removes recording `index` from the picture. */
-  clearRun(index: RunIndex): void {
-    const layer = this.layers[index];
-    if (!layer) return;
-    layer.fleet.dispose();
-    layer.trails.dispose();
-    layer.path.removeFromParent();
-    this.layers[index] = null;
     this.invalidate();
   }
 
@@ -204,7 +184,8 @@ export class Scene {
     return this.frameTimes.filter((time) => time > since).length;
   }
 
-  projection(vehicleId: number): Projection | null {
+  /** Places of the vehicle's parts, in CSS pixels of the page. */
+  projection(vehicleId: number) {
     const body = this.body(vehicleId);
     if (!body?.hasPose) return null;
     this.view.update(); // the camera may have changed since the last frame

@@ -14,17 +14,20 @@ export interface Shell {
   readonly scene: Scene | null;
   readonly plots: Plots;
   selected(): number;
-  select(vehicleId: number): void;
   /** `act` is called when the user chooses another vehicle. */
   onSelect(act: (vehicleId: number) => void): void;
   setRun(run: Run, index?: RunIndex): void;
-  setPoses(step: number, simTime: number, poses: readonly Pose[], index?: RunIndex): void;
+  setPoses(simTime: number, poses: readonly Pose[], index?: RunIndex): void;
+  /** Adds `window.slsView` with `own` functions, for tests. */
+  expose(own: object): void;
 }
 
 const kKeys: [string, string][] = [
   ["Space", "start, pause or resume"],
   ["N", "step"],
   ["Shift R / Shift S", "reset / stop"],
+];
+const kSharedKeys: [string, string][] = [
   ["1 2 3 4", "camera: orbit, follow, top, side"],
   ["F", "fit everything into the picture"],
   ["T", "table of positions"],
@@ -42,6 +45,7 @@ export function makeShell(): Shell {
   const picker = find<HTMLSelectElement>("vehicle");
   let selected = 0;
   let ids: number[] = [];
+  let newest: readonly Pose[] = [];
   let chosen: (vehicleId: number) => void = () => {};
 
   const select = (vehicleId: number) => {
@@ -59,7 +63,8 @@ export function makeShell(): Shell {
   scene?.onPick(choose);
   table.onPick(choose);
   picker.addEventListener("change", () => choose(Number(picker.value)));
-  setUpCameras(scene);
+  makeChoice(find("cameras"), ({ dataset }) => scene?.setCamera(dataset.camera as CameraMode));
+  find("fit").addEventListener("click", () => scene?.fit());
   makeChoice(find("windows"), ({ dataset }) => plots.setWindow(dataset.window === "all" ? null : Number(dataset.window)));
   document.addEventListener("keydown", (event) => {
     if (isTyping(event) || event.ctrlKey || event.metaKey || event.altKey) return;
@@ -77,21 +82,40 @@ export function makeShell(): Shell {
     scene,
     plots,
     selected: () => selected,
-    select,
     onSelect: (act) => void (chosen = act),
     setRun(run, index = 0) {
       scene?.setRun(run, index);
       if (index !== 0) return;
       plots.setRun(run);
+      newest = [];
       ids = run.vehicles.map(({ id }) => id);
       picker.replaceChildren(...ids.map((id) => make("option", { value: String(id) }, String(id))));
       find("vehicle-picker").hidden = ids.length < 2;
       table.setRun(run);
       select(ids.includes(selected) ? selected : (ids[0] ?? 0));
     },
-    setPoses(step, simTime, poses, index = 0) {
-      scene?.setPoses(step, simTime, poses, index);
-      if (index === 0) table.offer(simTime, poses);
+    setPoses(simTime, poses, index = 0) {
+      scene?.setPoses(simTime, poses, index);
+      if (index !== 0) return;
+      newest = poses;
+      table.offer(simTime, poses);
+    },
+    expose(own) {
+      Object.assign(window, {
+        slsView: {
+          redraw: () => scene?.invalidate(),
+          frames: () => scene?.frames() ?? 0,
+          projection: (vehicleId: number) => scene?.projection(vehicleId) ?? null,
+          camera: () => scene?.camera() ?? null,
+          cable: (vehicleId: number) => scene?.cable(vehicleId) ?? null,
+          /** Of the newest step, frame W. */
+          pose: (vehicleId: number) => {
+            const pose = newest.find((candidate) => candidate.vehicleId === vehicleId);
+            return pose ? { quad: Array.from(pose.quad), load: Array.from(pose.load), attitude: Array.from(pose.attitude) } : null;
+          },
+          ...own,
+        },
+      });
     },
   };
 }
@@ -105,11 +129,6 @@ function makeScene(): Scene | null {
     document.querySelector<HTMLElement>(".key-list")!.hidden = true;
     return null;
   }
-}
-
-function setUpCameras(scene: Scene | null): void {
-  makeChoice(find("cameras"), ({ dataset }) => scene?.setCamera(dataset.camera as CameraMode));
-  find("fit").addEventListener("click", () => scene?.fit());
 }
 
 function setUpTheme(): void {
@@ -139,7 +158,7 @@ function setUpTheme(): void {
 
 function setUpKeys(): void {
   const dialog = find<HTMLDialogElement>("keys");
-  const list = make("dl", {}, ...kKeys.flatMap(([key, text]) => [make("dt", {}, make("kbd", {}, key)), make("dd", {}, text)]));
+  const list = make("dl", {}, ...listKeys(kKeys));
   const close = make("button", { type: "button" }, "Close");
   close.addEventListener("click", () => dialog.close());
   dialog.replaceChildren(make("h2", { id: "keys-title" }, "Keys"), list, make("div", { class: "buttons" }, close));
@@ -147,6 +166,11 @@ function setUpKeys(): void {
   document.addEventListener("keydown", (event) => {
     if (event.key === "?" && !isTyping(event)) dialog.showModal();
   });
+}
+
+/** Elements of the list of keys: `keys`, then those that live flights and recordings have. */
+export function listKeys(keys: [string, string][]): HTMLElement[] {
+  return [...keys, ...kSharedKeys].flatMap(([key, text]) => [make("dt", {}, make("kbd", {}, key)), make("dd", {}, text)]);
 }
 
 /** Positions as numbers, the alternative to the scene. Not updated while it is hidden. */

@@ -1,10 +1,9 @@
 /** Trails of quadrotors and loads: one buffer of line segments for all vehicles, of bounded length. */
-import { BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, LineBasicMaterial, LineSegments } from "three";
+import { BufferAttribute, BufferGeometry, Color, DynamicDrawUsage, LineBasicMaterial, LineSegments, Vector3 } from "three";
 import { findLoad, hasLoad } from "./cables";
 import { kLoadColour, kQuadColour } from "./colours";
 import { toScene } from "./frames";
 import type { Pose, Run, RunIndex, Trail } from "./types";
-import { Vector3 } from "three";
 
 const kMostSegments = 12_000; // of all vehicles and both trails: software then draws 20 frames a second
 const kMostSlots = 1_500; // of one vehicle
@@ -43,9 +42,9 @@ export class Trails {
   }
 
   /** Adds a segment to every trail once enough simulated time has passed. */
-  extend(simTime: number, poses: readonly Pose[]): boolean {
+  extend(simTime: number, poses: readonly Pose[]): void {
     const passed = simTime - this.lastTime;
-    if (passed >= 0 && passed < this.spacing) return false;
+    if (passed >= 0 && passed < this.spacing) return;
     const isJump = !(passed >= 0 && passed < Math.max(1, 20 * this.spacing));
     this.lastTime = simTime;
     const count = this.places.size;
@@ -67,7 +66,6 @@ export class Trails {
     this.next = (this.next + 1) % this.slots;
     this.positions.addUpdateRange(start, count * kFloats);
     this.positions.needsUpdate = true;
-    return true;
   }
 
   /** Replaces the trail of one vehicle by the last points of `trail`. */

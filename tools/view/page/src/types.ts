@@ -1,15 +1,5 @@
 /** The page's data. Everything is in frame W (z down), SI units and radians, until frames.ts turns it for drawing. */
 
-/** Result of a step's answer: AnswerKind of idl/sls.idl. */
-export enum AnswerKind {
-  None,
-  Accepted,
-  Held,
-  FailSafe,
-  Refused,
-  Late,
-}
-
 export type Vector3 = readonly [number, number, number];
 
 export interface Rotor {
@@ -21,14 +11,11 @@ export interface Rotor {
 
 export interface Vehicle {
   id: number;
-  quad_mass_kg: number;
   load_mass_kg: number;
   rod_length_m: number;
   /** Attachment of the rod, in the body frame. */
   attachment_m: Vector3;
   rotors: Rotor[];
-  /** True for a point mass: it has no rotors, the page draws some. */
-  is_drawn_only?: boolean;
 }
 
 export interface Column {
@@ -98,7 +85,6 @@ export interface Cable {
 /** One vehicle at one step. Copy it to keep it: the arrays may be reused for the next step. */
 export interface Pose {
   vehicleId: number;
-  kind: AnswerKind;
   /** Position of the quadrotor, m. */
   quad: ArrayLike<number>;
   /** w, x, y, z. */
@@ -132,7 +118,6 @@ export interface Participant {
   role: string;
   name: string;
   host: string;
-  vehicle_ids: number[];
   ready: boolean;
   done: boolean;
   /** Recorder: it has all rows up to this step; −1: none. */
@@ -177,9 +162,6 @@ export interface Mark {
 }
 
 export interface Hello {
-  version: string;
-  domain: number;
-  vehicle_id: number;
   may_operate: boolean;
   why_not: string;
   needs_token: boolean;

@@ -31,7 +31,5 @@ function readBlock(id: string): ArrayBuffer {
   } catch {
     throw new Error(`#${id}: expected base64, got other letters`);
   }
-  const bytes = new Uint8Array(letters.length);
-  for (let i = 0; i < letters.length; ++i) bytes[i] = letters.charCodeAt(i);
-  return bytes.buffer;
+  return Uint8Array.from(letters, (letter) => letter.charCodeAt(0)).buffer;
 }

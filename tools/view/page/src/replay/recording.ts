@@ -1,5 +1,7 @@
 /** A recording as sls_view packs it (tools/view/replay/README.md): checks its bytes, gives poses at any time. */
-import { AnswerKind, Columns, type Cable, type Pose, type Rows, type Run } from "../types";
+import { Quaternion } from "three";
+import { findFirst } from "../samples";
+import { Columns, type Cable, type Pose, type Rows, type Run } from "../types";
 
 export interface RecordedEvent {
   step: number;
@@ -186,11 +188,10 @@ export class Recording {
     const { values } = rows;
     return {
       vehicleId,
-      kind: this.findKind(vehicleId, time),
       quad: calcBetween(values, a, b, quad, quadV, u, span),
       load: calcBetween(values, a, b, load, loadV, u, span),
       cable: this.findCable(values, a, b, u),
-      attitude: calcAttitude(values.subarray(a + attitude, a + attitude + 4), values.subarray(b + attitude, b + attitude + 4), u),
+      attitude: calcAttitude(values, a + attitude, b + attitude, u),
       reference: [0, 1, 2].map((axis) => mix(values[a + reference + axis]!, values[b + reference + axis]!, u)),
       rotorRate: this.calcRotorRate(values, a),
     };
@@ -212,7 +213,7 @@ export class Recording {
       length: mix(values[a + length]!, values[b + length]!, u),
       isTaut: values[a + taut] === 1,
       isReleased: released >= 0 && values[a + released] === 1,
-      attitude: calcAttitude(values.subarray(a + attitude, a + attitude + 4), values.subarray(b + attitude, b + attitude + 4), u),
+      attitude: calcAttitude(values, a + attitude, b + attitude, u),
     };
   }
 
@@ -220,24 +221,11 @@ export class Recording {
     if (this.rotors.length === 0) return NaN;
     return this.rotors.reduce((sum, place) => sum + values[row + place]!, 0) / this.rotors.length;
   }
-
-  private findKind(vehicleId: number, time: number): AnswerKind {
-    for (const { vehicle, on, kind, from_s, to_s } of this.head.faults)
-      if (!on && vehicle === vehicleId && from_s <= time && time < to_s)
-        return kind === "held" ? AnswerKind.Held : kind === "fail_safe" ? AnswerKind.FailSafe : AnswerKind.Refused;
-    return AnswerKind.Accepted;
-  }
 }
 
 /** Index of the last row at or before `time`; 0 if there is none. */
 export function findRow(times: Float64Array, time: number): number {
-  let [low, high] = [0, times.length - 1];
-  while (low < high) {
-    const middle = Math.ceil((low + high) / 2);
-    if (times[middle]! <= time + 1e-9) low = middle;
-    else high = middle - 1;
-  }
-  return low;
+  return Math.max(0, findFirst(times, times.length, time + 1e-9) - 1);
 }
 
 export function distance(a: ArrayLike<number>, b: ArrayLike<number>): number {
@@ -261,15 +249,11 @@ function calcBetween(
 }
 
 /** Attitude between two attitudes w, x, y, z along the shorter way; level if there is none. */
-function calcAttitude(a: ArrayLike<number>, b: ArrayLike<number>, u: number): number[] {
-  const from = Array.from(a);
-  const to = Array.from(b);
+function calcAttitude(values: Float32Array, a: number, b: number, u: number): number[] {
+  const [from, to] = [values.subarray(a, a + 4), values.subarray(b, b + 4)];
   if (!from.every(Number.isFinite)) return [1, 0, 0, 0];
-  if (u === 0 || !to.every(Number.isFinite)) return from;
-  const dot = from.reduce((sum, value, i) => sum + value * to[i]!, 0);
-  const sign = dot < 0 ? -1 : 1;
-  const angle = Math.acos(Math.min(1, Math.abs(dot)));
-  const sine = Math.sin(angle);
-  const [s, t] = sine < 1e-6 ? [1 - u, u] : [Math.sin((1 - u) * angle) / sine, Math.sin(u * angle) / sine];
-  return from.map((value, i) => s * value + t * sign * to[i]!);
+  if (u === 0 || !to.every(Number.isFinite)) return [...from];
+  const [one, other] = [from, to].map(([w, x, y, z]) => new Quaternion(x, y, z, w));
+  const { w, x, y, z } = one!.slerp(other!, u);
+  return [w, x, y, z];
 }

@@ -2,9 +2,8 @@
 import { findLoad } from "../cables";
 import { find, make, setText } from "../dom";
 import { showBanner, showLines, showPhase, showRun, showStage, showTime } from "../panels";
-import { makeShell, type Shell } from "../shell";
-import type { PageMode, Pose, RunIndex, Trail } from "../types";
-import { findLargestDistance, formatMetres } from "./comparison";
+import { listKeys, makeShell, type Shell } from "../shell";
+import type { PageMode, RunIndex, Trail } from "../types";
 import { loadRecording } from "./load";
 import { Player } from "./player";
 import { distance, findRow, type RecordedFault, type Recording } from "./recording";
@@ -13,6 +12,7 @@ import { formatTime, Timeline, type TimelineMark } from "./timeline";
 const kTrailSpacing = 0.04; // s of simulated time between two points
 const kMostTrailPoints = 1400;
 const kShortFlight = 60; // s that plots show at once
+const kMostSamples = 4000; // of a comparison
 
 const kKeys: [string, string][] = [
   ["Space", "play or pause"],
@@ -20,12 +20,6 @@ const kKeys: [string, string][] = [
   ["< >", "slower or faster"],
   ["P N", "previous or next mark"],
   ["L", "loop"],
-  ["1 2 3 4", "camera: orbit, follow, top, side"],
-  ["F", "fit everything into the picture"],
-  ["T", "table of positions"],
-  ["[ ]", "previous and next vehicle"],
-  ["Arrows, + −", "turn and zoom, with the scene in focus"],
-  ["?", "these keys"],
 ];
 
 /** Shows the recordings of `mode`, or on the page the error that they have. */
@@ -50,10 +44,8 @@ class Replay {
   private readonly main: Recording;
   private readonly names: string[];
   private readonly apart: HTMLElement[] = [];
-  private marks: TimelineMark[] = [];
   private shownTime = NaN;
   private lastFrame = 0;
-  private poses: Pose[] = [];
 
   constructor(
     private readonly shell: Shell,
@@ -92,8 +84,7 @@ class Replay {
     const panel = find("participants-panel");
     setText(panel.querySelector("h2")!, this.recordings.length > 1 ? "Recordings" : "Recording");
     setText(find("events-panel").querySelector("h2")!, "Stages, events and faults");
-    find("keys").querySelector("dl")!.replaceChildren(
-      ...kKeys.flatMap(([key, text]) => [make("dt", {}, make("kbd", {}, key)), make("dd", {}, text)]));
+    find("keys").querySelector("dl")!.replaceChildren(...listKeys(kKeys));
     const list = find("events");
     list.setAttribute("role", "list");
     list.setAttribute("aria-live", "off");
@@ -130,9 +121,9 @@ class Replay {
       const rows = recording.rowsAs(this.main.columns, vehicleId);
       if (rows) this.shell.plots.replace(rows, index as RunIndex);
     });
-    this.marks = this.listMarks(vehicleId);
-    this.timeline.setMarks(this.marks);
-    this.shell.plots.setMarks(this.marks.flatMap((mark) =>
+    const marks = this.listMarks(vehicleId);
+    this.timeline.setMarks(marks);
+    this.shell.plots.setMarks(marks.flatMap((mark) =>
       mark.to === undefined ? [mark] : [mark, { ...mark, time: mark.to, text: `${mark.text} ends` }]));
     this.showRecordings(vehicleId);
     this.shownTime = NaN;
@@ -154,7 +145,6 @@ class Replay {
   }
 
   private showRecordings(vehicleId: number): void {
-    const place = find("participants");
     this.apart.length = 0;
     const value = () => {
       const element = make("dd");
@@ -174,7 +164,7 @@ class Replay {
       list.append(make("dt", {}, "at most"), make("dd", { id: "most-apart" },
         Number.isFinite(largest.time) ? `${formatMetres(largest.distance)} at ${formatTime(largest.time)} s` : "–"));
     }
-    place.replaceChildren(list);
+    find("participants").replaceChildren(list);
   }
 
   private drawFrame(now: number): void {
@@ -200,12 +190,7 @@ class Replay {
     const { time } = this.player;
     if (time !== this.shownTime) {
       this.shownTime = time;
-      this.recordings.forEach((recording, index) => {
-        const poses = recording.posesAt(time);
-        const step = Math.round(time / recording.run.period_s);
-        this.shell.setPoses(step, time, poses, index as RunIndex);
-        if (index === 0) this.poses = poses;
-      });
+      this.recordings.forEach((recording, index) => this.shell.setPoses(time, recording.posesAt(time), index as RunIndex));
       this.shell.plots.setCursor(time);
       this.showTexts(time);
     }
@@ -225,34 +210,19 @@ class Replay {
     this.apart.forEach((element, index) => setText(element, texts[index] ?? "–"));
   }
 
-  /** For tests. */
   private expose(): void {
-    const { scene } = this.shell;
-    Object.assign(window, {
-      slsView: {
-        projection: (vehicleId: number) => scene?.projection(vehicleId) ?? null,
-        camera: () => scene?.camera() ?? null,
-        cable: (vehicleId: number) => scene?.cable(vehicleId) ?? null,
-        frames: () => scene?.frames() ?? 0,
-        fps: () => scene?.fps() ?? 0,
-        seek: (time: number) => {
-          this.player.pause();
-          this.player.seek(time);
-          this.jump();
-        },
-        state: () => ({
-          sim_time_s: this.player.time,
-          is_playing: this.player.isPlaying,
-          selected: this.shell.selected(),
-          recordings: this.names,
-          marks: this.marks.length,
-          has_scene: scene !== null,
-        }),
-        pose: (vehicleId: number) => {
-          const pose = this.poses.find((candidate) => candidate.vehicleId === vehicleId);
-          return pose ? { quad: Array.from(pose.quad), load: Array.from(pose.load), attitude: Array.from(pose.attitude) } : null;
-        },
+    this.shell.expose({
+      seek: (time: number) => {
+        this.player.pause();
+        this.player.seek(time);
+        this.jump();
       },
+      state: () => ({
+        sim_time_s: this.player.time,
+        is_playing: this.player.isPlaying,
+        recordings: this.names,
+        has_scene: this.shell.scene !== null,
+      }),
     });
   }
 }
@@ -286,4 +256,25 @@ function makeTrail(recording: Recording, vehicleId: number, time: number): Trail
       : rows.values.subarray(at + loadAt, at + loadAt + 3)));
   }
   return { quad: quad!, load: load! };
+}
+
+/** Largest distance between the loads of one vehicle in two recordings, m, and when. */
+function findLargestDistance(a: Recording, b: Recording, vehicleId: number): { distance: number; time: number } {
+  const none = { distance: NaN, time: NaN };
+  const rows = a.rowsOf(vehicleId);
+  if (!rows || !b.rowsOf(vehicleId)) return none;
+  const stride = Math.max(1, Math.ceil(rows.time.length / kMostSamples));
+  let largest = none;
+  for (let i = 0; i < rows.time.length; i += stride) {
+    const time = rows.time[i]!;
+    if (time < b.from || time > b.to) continue;
+    const apart = distance(a.poseAt(vehicleId, time).load, b.poseAt(vehicleId, time).load);
+    if (!(apart <= largest.distance)) largest = { distance: apart, time };
+  }
+  return largest;
+}
+
+/** "0.0123 m", or "–" where there is none. */
+function formatMetres(length: number): string {
+  return Number.isFinite(length) ? `${length.toPrecision(3)} m` : "–";
 }

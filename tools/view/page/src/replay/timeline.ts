@@ -21,12 +21,12 @@ export interface TimelineOptions {
 
 export class Timeline {
   private readonly slider: HTMLInputElement;
-  private readonly playButton: HTMLButtonElement;
-  private readonly speed: HTMLSelectElement;
-  private readonly loop: HTMLInputElement;
-  private readonly label: HTMLElement;
-  private readonly stage: HTMLElement;
-  private readonly band: HTMLElement;
+  private readonly playButton = make("button", { type: "button", class: "timeline-play primary" });
+  private readonly speed = make("select");
+  private readonly loop = make("input", { type: "checkbox" });
+  private readonly label = make("output", { class: "timeline-time", "aria-live": "off" });
+  private readonly stage = make("span", { class: "timeline-now" });
+  private readonly band = make("div", { class: "timeline-band", "aria-hidden": "true" });
   private marks: TimelineMark[] = [];
 
   constructor(
@@ -35,29 +35,22 @@ export class Timeline {
   ) {
     const { player } = options;
     element.classList.add("timeline");
-    this.playButton = make("button", { type: "button", class: "timeline-play primary" });
     this.playButton.addEventListener("click", () => this.toggle());
     this.slider = make("input", {
       type: "range", class: "timeline-slider", id: "time", "aria-label": "Simulated time",
       min: `${player.from}`, max: `${player.to}`, step: "any",
     });
     this.slider.addEventListener("input", () => this.seek(Number(this.slider.value)));
-    this.band = make("div", { class: "timeline-band", "aria-hidden": "true" });
-    const track = make("div", { class: "timeline-track" });
-    track.append(this.band, this.slider);
+    const track = make("div", { class: "timeline-track" }, this.band, this.slider);
 
-    this.label = make("output", { class: "timeline-time", "aria-live": "off" });
-    this.stage = make("span", { class: "timeline-now" });
-    this.speed = make("select");
     this.speed.append(...kSpeeds.map((speed) => new Option(`${speed}×`, `${speed}`, speed === 1, speed === 1)));
     this.speed.addEventListener("change", () => {
       player.setSpeed(Number(this.speed.value));
       this.update();
     });
-    this.loop = make("input", { type: "checkbox" });
     this.loop.addEventListener("change", () => (player.loops = this.loop.checked));
-    const controls = make("div", { class: "timeline-controls" });
-    controls.append(this.playButton, this.label, this.stage, labelled("Speed", this.speed), labelled("Loop", this.loop));
+    const controls = make("div", { class: "timeline-controls" }, this.playButton, this.label, this.stage,
+      make("label", {}, "Speed ", this.speed), make("label", {}, "Loop ", this.loop));
     element.append(controls, track);
     document.addEventListener("keydown", (event) => this.handleKey(event));
     this.update();
@@ -81,13 +74,11 @@ export class Timeline {
     );
     this.options.list.replaceChildren(
       ...this.marks.map((mark) => {
-        const button = make("button", { type: "button" });
         const time = make("time", {}, `${formatTime(mark.time)} s`);
-        button.append(time, make("span", { class: `timeline-key timeline-${mark.kind}` }), mark.text);
+        const key = make("span", { class: `timeline-key timeline-${mark.kind}` });
+        const button = make("button", { type: "button" }, time, key, mark.text);
         button.addEventListener("click", () => this.seek(mark.time));
-        const item = make("li");
-        item.append(button);
-        return item;
+        return make("li", {}, button);
       }),
     );
   }
@@ -160,10 +151,4 @@ export class Timeline {
 /** Seconds with two decimals. */
 export function formatTime(seconds: number): string {
   return seconds.toFixed(2);
-}
-
-function labelled(text: string, control: HTMLElement): HTMLLabelElement {
-  const label = make("label");
-  label.append(`${text} `, control);
-  return label;
 }

@@ -6,19 +6,16 @@ import pty
 import select
 import shutil
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "python"), str(ROOT / "tests/launcher")]
-import checkout  # noqa: E402
-from sls.launcher import completion  # noqa: E402
-from sls.launcher.commands import COMMANDS  # noqa: E402
+import checkout
+from places import ROOT
+from sls.launcher import completion
+from sls.launcher.commands import COMMANDS
 
 FILE = ROOT / "tools/completion/sls.bash"
-del sys.argv[1:]  # the build tree
 
 COMPLETE = """
 source "$1"; shift
@@ -117,7 +114,3 @@ class Completion(unittest.TestCase):
             os.close(terminal)  # ends the bash by SIGHUP
             os.waitpid(process, 0)
         self.assertIn(b"./sls discovery-server X", shown)
-
-
-if __name__ == "__main__":
-    unittest.main()

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
 #include "tests/common/config/support.hpp"
@@ -10,12 +11,12 @@ namespace {
 /// 4 ms period, 1 ms step, one stage of 2 s.
 Scenario make_scenario() { return parse_scenario(kMinimalScenario, "file"); }
 
-std::string find_override_error(double period_s) {
-  Scenario scenario = make_scenario();
+std::string find_override_error(double period_s, const Scenario& before = make_scenario()) {
+  Scenario scenario = before;
   try {
     override_period(scenario, period_s);
   } catch (const ConfigError& error) {
-    EXPECT_TRUE(are_equal(scenario, make_scenario())) << "changed in spite of the error";
+    EXPECT_TRUE(are_equal(scenario, before)) << "changed in spite of the error";
     return error.what();
   }
   return "no error";
@@ -64,19 +65,10 @@ TEST(OverridePeriodTest, PeriodMustFitStepAndStages) {
 }
 
 TEST(OverridePeriodTest, PeriodMustFitTheDelaysOfFaults) {
-  const auto find_error_at = [](const std::string& by_s, double period_s) -> std::string {
-    Scenario scenario = parse_scenario(std::string(kMinimalScenario) +
-                                           "faults:\n  - freeze: { on: state }\n  - delay: { on: "
-                                           "state, by_s: " +
-                                           by_s + " }\n",
-                                       "file");
-    try {
-      override_period(scenario, period_s);
-    } catch (const ConfigError& error) {
-      EXPECT_EQ(scenario.sync.period_ns, 4'000'000) << "changed in spite of the error";
-      return error.what();
-    }
-    return "no error";
+  const auto find_error_at = [](const std::string& by_s, double period_s) {
+    const std::string faults =
+        "faults:\n  - freeze: { on: state }\n  - delay: { on: state, by_s: " + by_s + " }\n";
+    return find_override_error(period_s, parse_scenario(kMinimalScenario + faults, "file"));
   };
   EXPECT_EQ(find_error_at("0.02", 0.002), "no error");
   EXPECT_EQ(find_error_at("0.02", 0.008),
@@ -93,44 +85,47 @@ TEST(OverridePeriodTest, AShorterStepMustNotMeanTooManySamplesUnderWay) {
   override_period(scenario, 0.00001);  // samples stay 10 ms apart
   EXPECT_EQ(scenario.plant.step_ns, 10'000);
   scenario.sensing.node_delay_ns = 1'500'000'000;
-  try {
-    override_period(scenario, 0.00001);
-    FAIL() << "no error";
-  } catch (const ConfigError& error) {
-    EXPECT_STREQ(error.what(),
-                 "--period-s: sensing.node_delay_s: expected at most 100000 samples of 0.00001 s "
-                 "under way, got 1.5");
-  }
+  EXPECT_EQ(find_override_error(0.00001, scenario),
+            "--period-s: sensing.node_delay_s: expected at most 100000 samples of 0.00001 s under "
+            "way, got 1.5");
 }
 
 TEST(OverridePeriodTest, TheStepInForceMustFitThePeriodOfTheAutopilot) {
-  const auto with_period = [](const char* autopilot) {
-    return parse_scenario(
-        replace_once(kMinimalScenario, "plant:\n",
-                     std::string("autopilot: ") + autopilot +
-                         "\n"
-                         "plant:\n"
-                         "  model: multirotor\n"
-                         "  inertia_kg_m2: [0.03, 0.03, 0.06]\n"
-                         "  rotor: { thrust_constant_n_s2: 5.0e-6, max_speed_rad_s: 2000 }\n"
-                         "  rotors: [{ position_m: [0, 0, 0], spin: ccw }]\n"),
-        "file");
-  };
-  const auto find_error_at = [&](const char* autopilot, double period_s) -> std::string {
-    Scenario scenario = with_period(autopilot);
-    try {
-      override_period(scenario, period_s);
-    } catch (const ConfigError& error) {
-      EXPECT_TRUE(are_equal(scenario, with_period(autopilot))) << "changed in spite of the error";
-      return error.what();
-    }
-    return "no error";
+  const auto find_error_at = [](const char* autopilot, double period_s) {
+    return find_override_error(period_s, parse_scenario(make_autopilot_text(autopilot), "file"));
   };
   EXPECT_EQ(find_error_at("{ model: px4, period_s: 0.003 }", 0.02), "no error");  // the step stays
   EXPECT_EQ(find_error_at("{ model: px4, period_s: 0.003 }", 0.0005), "no error");
   EXPECT_EQ(find_error_at("{ model: px4, period_s: 0.003 }", 0.0008),
             "--period-s: expected a divisor of autopilot.period_s (0.003), got 0.0008");
   EXPECT_EQ(find_error_at("{ model: none }", 0.0008), "no error");
+}
+
+std::string find_factor_error(SyncMode mode, double factor) {
+  Scenario scenario = parse_scenario(kMinimalScenario, "file");
+  scenario.sync.mode = mode;
+  try {
+    override_real_time_factor(scenario, factor);
+  } catch (const ConfigError& error) {
+    EXPECT_EQ(scenario.sync.real_time_factor, 1.0) << "changed in spite of the error";
+    return error.what();
+  }
+  EXPECT_EQ(scenario.sync.real_time_factor, factor);
+  return "no error";
+}
+
+TEST(OverrideRealTimeFactorTest, AcceptsTheValuesOfTheKey) {
+  EXPECT_EQ(find_factor_error(SyncMode::kRealtime, 0.5), "no error");
+  EXPECT_EQ(find_factor_error(SyncMode::kRealtime, 1000.0), "no error");
+  for (const double factor : {0.0, -1.0, 1000.1, std::nan("")})
+    EXPECT_EQ(find_factor_error(SyncMode::kRealtime, factor)
+                  .rfind("--rtf: expected from 0.001 to 1000, got ", 0),
+              0u);
+}
+
+TEST(OverrideRealTimeFactorTest, LockstepHasNone) {
+  EXPECT_EQ(find_factor_error(SyncMode::kLockstep, 2.0),
+            "--rtf: expected --mode realtime with it, got lockstep");
 }
 
 }  // namespace
