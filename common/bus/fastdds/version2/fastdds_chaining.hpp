@@ -20,7 +20,8 @@ class ChainedTransport : public rtps::ChainingTransport {
   }
 
   bool send(rtps::SenderResource* below, const rtps::octet* buffer, std::uint32_t bytes,
-            rtps::LocatorsIterator* first, rtps::LocatorsIterator* last,
+            eprosima::fastdds::rtps::LocatorsIterator* first,
+            eprosima::fastdds::rtps::LocatorsIterator* last,
             const std::chrono::steady_clock::time_point& deadline) override {
     return below->send(buffer, bytes, first, last, deadline);
   }

@@ -22,7 +22,8 @@ class ChainedTransport : public rtps::ChainingTransport {
   }
 
   bool send(rtps::SenderResource* below, const std::vector<rtps::NetworkBuffer>& buffers,
-            std::uint32_t bytes, rtps::LocatorsIterator* first, rtps::LocatorsIterator* last,
+            std::uint32_t bytes, eprosima::fastdds::rtps::LocatorsIterator* first,
+            eprosima::fastdds::rtps::LocatorsIterator* last,
             const std::chrono::steady_clock::time_point& deadline) override {
     return below->send(buffers, bytes, first, last, deadline);
   }
