@@ -79,12 +79,12 @@ TEST_F(StaleSegmentsTest, WhatAKilledProcessHadNotFinishedIsRemoved) {
   const std::string names[] = {make_port(8160), make_name("port8161"),
                                std::string(kDataSharingPrefix) + "1"};
   for (const std::size_t size : {0, 100}) {
-    for (const std::string& name : names) {
+    for (const std::string& name : names)
       test::write_bytes(folder_ / name, std::string(size, '\0'));
-      EXPECT_TRUE(find_stale_segments(folder_.path()).empty()) << "it may be made just now";
+    EXPECT_TRUE(find_stale_segments(folder_.path()).empty()) << "they may be made just now";
+    for (const std::string& name : names)
       fs::last_write_time(folder_ / name,
                           fs::file_time_type::clock::now() - std::chrono::seconds(60));
-    }
     remove_stale_segments(folder_.path());
     for (const std::string& name : names) EXPECT_FALSE(exists(name)) << name;
   }
@@ -117,7 +117,7 @@ TEST_F(StaleSegmentsTest, WithoutStalePortsAnyParticipantIdWillDo) {
 TEST_F(StaleSegmentsTest, PortsOfKilledAndOfLivingProcessesAreAvoided) {
   make(make_port(8161) + "_el", std::chrono::seconds(60));  // participant 0: killed
   make(make_port(8162) + "_el", std::chrono::seconds(60));  // participant 1: alive
-  const fs::path lock = folder_ / make_port(8162) + "_el";
+  const fs::path lock = folder_ / (make_port(8162) + "_el");
   const int descriptor = open(lock.c_str(), O_RDONLY);
   ASSERT_EQ(flock(descriptor, LOCK_EX | LOCK_NB), 0);
   EXPECT_EQ(choose_participant_id({8160, 2}, {}, folder_.path()), 2);
