@@ -31,13 +31,13 @@
 #include "common/bus/fastdds/data_sharing.hpp"
 #include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
+#include "common/bus/fastdds/guarded_transports.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
 #include "common/bus/fastdds/participant_ids.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "common/bus/fastdds/shared_locks.hpp"
-#include "common/bus/fastdds/small_datagrams.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/fastdds/transports.hpp"
 #include "common/bus/qos_file.hpp"
@@ -144,7 +144,7 @@ struct Node::Impl {
     if (transports == Transports::kAll) shorten_queue(qos.transport());
     is_on_this_machine = are_local(qos.transport());
     has_memory_of_machine = is_on_this_machine && has_shared_memory(qos);
-    limit_datagrams(qos);
+    const std::uint32_t most_sent = limit_datagrams(qos);
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
     MiddlewareLog::clear();
@@ -164,8 +164,7 @@ struct Node::Impl {
     announce_what_discovery_lacks(qos);
     listener = std::make_unique<ParticipantListener>(own, &neighbours, &discovered);
     listener->hear(qos);
-    participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
-                                              listener.get(), dds::StatusMask::none());
+    participant = create_participant(domain, qos, listener.get(), most_sent);
     if (participant)
       publisher = participant->create_publisher(dds::PUBLISHER_QOS_DEFAULT),
       subscriber = participant->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
@@ -211,12 +210,13 @@ struct Node::Impl {
     return std::max(kLeast, bytes);
   }
 
-  /// Limits outgoing datagrams to the property sls.max_datagram_bytes of the profile, if it is set.
-  void limit_datagrams(dds::DomainParticipantQos& qos) {
+  /// Most bytes of an outgoing datagram by the property sls.max_datagram_bytes of the profile; 0 if
+  /// it is not set.
+  std::uint32_t limit_datagrams(const dds::DomainParticipantQos& qos) {
     constexpr const char* kProperty = "sls.max_datagram_bytes";
     constexpr std::size_t kLeast = 600;  // a vehicle fits
     const auto* text = rtps::PropertyPolicyHelper::find_property(qos.properties(), kProperty);
-    if (!text) return;
+    if (!text) return 0;
     std::size_t bytes = 0;
     const char* end = text->data() + text->size();
     const auto [rest, error] = std::from_chars(text->data(), end, bytes);
@@ -225,9 +225,8 @@ struct Node::Impl {
                         std::to_string(kLeast) + " to " + std::to_string(max_datagram_bytes) +
                         ", got '" + *text + "'");
     max_datagram_bytes = bytes;
-    const std::size_t sent = is_secured ? std::max(bytes, calc_handshake_bytes(qos)) : bytes;
-    for (auto& transport : qos.transport().user_transports)
-      transport = send_small_datagrams(transport, static_cast<std::uint32_t>(sent));
+    return static_cast<std::uint32_t>(is_secured ? std::max(bytes, calc_handshake_bytes(qos))
+                                                 : bytes);
   }
 
   /// The file that a property of DDS Security names as file://…; empty if it names none.
