@@ -52,7 +52,7 @@ def make_markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) ->
 
 
 def fill_page(page: Path, values: Mapping[str, str]) -> str:
-    """The text of a page with each value or table between its two markers, <!--name--> and <!--/-->, replaced by that of
-    `values`."""
-    return re.sub(r"(<!--(\w+)-->\n?).*?(?=<!--/-->)", lambda found: found[1] + values[found[2]], page.read_text(),
-                  flags=re.DOTALL)
+    """The text of a page with that of `values` after its markers: <!--name-->value<!--/-->, or <!--name--> in the line
+    above a table."""
+    return re.sub(r"(<!--(\w+)-->\n?)((?<=\n)(?:\|.*\n)*|.*?(?=<!--/-->))", lambda found: found[1] + values[found[2]],
+                  page.read_text())

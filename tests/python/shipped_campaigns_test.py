@@ -63,11 +63,11 @@ class ShippedCampaignsTest(unittest.TestCase):
             self.assertIn(f"`./sls campaign {name}`", page)
 
     def test_values_and_tables_are_replaced_between_their_markers(self):
-        text = "Of <!--a-->1<!--/--> and <!--b-->2<!--/--> <!-- a note -->\n\n<!--a_table-->\n| x |\n| y |\n<!--/-->\n"
+        text = "Of <!--a-->1<!--/--> and <!--b-->2<!--/--> <!-- a note -->\n\n<!--a_table-->\n| x |\n| y |\n\n"
         with unittest.mock.patch.object(pathlib.Path, "read_text", lambda _: text):
             filled = fill_page(pathlib.Path(), {"a": "3", "b": "–", "a_table": "| z |\n", "unused": "4"})
         self.assertEqual(filled, "Of <!--a-->3<!--/--> and <!--b-->–<!--/--> <!-- a note -->\n\n"
-                                 "<!--a_table-->\n| z |\n<!--/-->\n")
+                                 "<!--a_table-->\n| z |\n\n")
 
 
 class PredictionTest(unittest.TestCase):

@@ -16,9 +16,9 @@ from sls.campaign import studies, team_studies
 from sls.campaign.run_table import read_runs
 from sls.figures import STYLE, save
 from sls.input_error import InputError
+from sls.scenario import ROOT
 from sls.tables import fill_page
 
-DOCS = Path(__file__).resolve().parents[3] / "docs"
 STUDIES = {"mass_and_delay": studies.study_mass_and_delay, "gains": studies.study_gains, "wind": studies.study_wind,
            "integral": studies.study_integral, "px4_ingredients": studies.study_px4_ingredients,
            "law_comparison": studies.study_law_comparison, "team": team_studies.study_team,
@@ -35,7 +35,7 @@ def write_findings(campaigns: Path, out: Path) -> Path:
             values |= found
             save(figure, out / "campaigns" / f"{name}.png", 100)
     page = out / "campaigns.md"
-    page.write_text(fill_page(DOCS / "campaigns.md", values))
+    page.write_text(fill_page(ROOT / "docs/campaigns.md", values))
     return page
 
 
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the command and returns the exit code."""
     parser = argparse.ArgumentParser(prog="python -m sls.campaign.findings", description=__doc__)
     parser.add_argument("campaigns", type=Path, metavar="DIR")
-    parser.add_argument("--out", type=Path, default=DOCS, metavar="DIR")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs", metavar="DIR")
     options = parser.parse_args(arguments)
     try:
         print(f"sls: campaigns: {write_findings(options.campaigns, options.out)}", file=sys.stderr)
