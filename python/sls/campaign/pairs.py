@@ -8,8 +8,7 @@ import numpy as np
 
 from sls.campaign.drawing import format_number
 from sls.campaign.run_table import OUTCOMES, RunTable
-from sls.campaign.statistics import (calc_mcnemar_p, calc_paired_difference, calc_quantiles,
-                                     calc_share_interval)
+from sls.campaign.statistics import calc_paired_difference, calc_quantiles, calc_share_interval, calc_sign_p
 
 NONE = "–"  # of a statistic without draws
 
@@ -101,7 +100,7 @@ def describe_changes(pairs: Pairs) -> str:
         return text
     places = np.unique(draw, return_inverse=True)[1]
     changes = np.bincount(places, change)
-    p = calc_mcnemar_p(int(np.sum(changes > 0)), int(np.sum(changes < 0)))
+    p = calc_sign_p(int(np.sum(changes > 0)), int(np.sum(changes < 0)))
     among = f" of {len(changes)} draws" if len(changes) < len(change) else ""
     return f"{text}: McNemar's exact p{among} = {p:.3g}"
 

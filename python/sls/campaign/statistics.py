@@ -76,14 +76,8 @@ class PairedDifference:
 
 
 def calc_sign_p(one: int, other: int) -> float:
-    """p of formula 5, if one sign occurs `one` times and the other `other` times; 1 if neither occurs."""
+    """p of formulas 5 and 6, if one sign occurs `one` times and the other `other` times; 1 if neither occurs."""
     return float(min(1.0, 2.0 * binom.cdf(min(one, other), one + other, 0.5)))
-
-
-def calc_mcnemar_p(to_one: int, to_other: int) -> float:
-    """p of formula 6: the probability that chance makes the numbers of changes in both directions differ
-    at least as much."""
-    return calc_sign_p(to_one, to_other)
 
 
 def calc_paired_difference(a: np.ndarray, b: np.ndarray, draw: np.ndarray | None = None,
