@@ -6,13 +6,14 @@ import os
 import platform
 import signal
 import sys
+import tempfile
 from collections.abc import Callable
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any, NoReturn
 
 from bench import instructions, loop, plant, start
-from bench.programs import MeasurementError, Programs, make_scratch, take_domain
+from bench.programs import MeasurementError, Programs, take_domain
 from bench.results import Figure, format_table
 
 Measure = Callable[[Programs, int, bool], list[Figure]]
@@ -97,7 +98,7 @@ def main() -> int:
     try:
         options = parse_arguments()
         domain, lock = take_domain()
-        with lock, make_scratch() as scratch:
+        with lock, tempfile.TemporaryDirectory(prefix="sls-bench-") as scratch:
             result = measure(options, Programs(options.build, domain, Path(scratch)))
         if options.json:
             options.json.write_text(json.dumps(result, indent=2) + "\n")

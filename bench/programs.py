@@ -7,7 +7,6 @@ import re
 import signal
 import socket
 import subprocess
-import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -72,9 +71,6 @@ class Programs:
         path = self.make_path(".yaml")
         path.write_text(text)
         return path
-
-    def qos(self, name: str | Path) -> Path:
-        return name if isinstance(name, Path) else ROOT / "config/qos" / f"{name}.xml"
 
     # --- one program ------------------------------------------------------------------------------
 
@@ -152,13 +148,13 @@ class Programs:
                 raise MeasurementError(f"{name} ended with {process.returncode}: {said[name].strip()}")
         return processor_s, said
 
-    def fly(self, scenario: Path, *, qos: str | Path = "default", is_recorded: bool = True,
+    def fly(self, scenario: Path, *, qos: str = "default", is_recorded: bool = True,
             server: tuple[str, ...] = (), during: Callable[[], None] | None = None,
             may_spin: bool = True) -> Flight:
         """Flies `scenario` and calls `during` in the flight. Without `may_spin`, the threads of server
         and client that wait for an answer block at once."""
         recording = self.make_path("") if is_recorded else None
-        commands = self.make_commands(scenario, recording, "--qos", str(self.qos(qos)), server=server)
+        commands = self.make_commands(scenario, recording, "--qos", str(ROOT / f"config/qos/{qos}.xml"), server=server)
         processor_s, said = self.run_together(commands, during=during, may_spin=may_spin)
         found = re.search(r"finished: (\d+) steps, .*, (\d+) steps/s, \d+ resent, (.*)", said["sim_server"])
         if not found:
@@ -177,7 +173,3 @@ def end_all(processes: list[subprocess.Popen[bytes]]) -> None:
         except subprocess.TimeoutExpired:
             process.kill()
             process.wait()
-
-
-def make_scratch() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="sls-bench-", dir=os.environ.get("TMPDIR"))

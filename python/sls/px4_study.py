@@ -180,10 +180,6 @@ def find_scenario(planned: Planned, recordings: Path) -> Path:
     return path
 
 
-def find_margin_file(planned: Planned, recordings: Path) -> Path:
-    return recordings / "scenarios" / f"{planned.name}.txt"
-
-
 def run_launcher(planned: Planned, arguments: Sequence[str]) -> str:
     """The output of `./sls`. Raises RunFailed."""
     done = subprocess.run([str(ROOT / "sls"), *arguments], check=False, capture_output=True,
@@ -205,9 +201,8 @@ def fly_all(flights: Sequence[Planned], recordings: Path, say: Callable[[str], N
 
     def find_margin(planned: Planned) -> None:
         say(f"study: looking for the delay margin of {planned.name}")
-        scenario = find_scenario(planned, recordings)
-        table = run_launcher(planned, ["delay-margin", str(scenario)])
-        find_margin_file(planned, recordings).write_text(table)
+        table = run_launcher(planned, ["delay-margin", str(find_scenario(planned, recordings))])
+        (recordings / f"scenarios/{planned.name}.txt").write_text(table)
 
     (recordings / "scenarios").mkdir(parents=True, exist_ok=True)
     with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
@@ -251,7 +246,7 @@ class Margin:
 
 
 def load_margin(planned: Planned, recordings: Path) -> Margin:
-    path = find_margin_file(planned, recordings)
+    path = recordings / f"scenarios/{planned.name}.txt"
     text = path.read_text() if path.exists() else ""
     # Columns: delay, periods, worst error, rms error, outcome.
     rows = {fields[0]: fields for line in text.splitlines()[1:-1] if (fields := line.split())}

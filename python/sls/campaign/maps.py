@@ -1,12 +1,9 @@
 """Tables of runs as maps, and their figures."""
 
-from collections.abc import Sequence
-
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from sls.campaign.run_table import RunTable
 from sls.campaign.statistics import calc_wilson_interval
@@ -58,7 +55,3 @@ def draw_classes(axes: Axes, x: np.ndarray, y: np.ndarray, classes: np.ndarray) 
     axes.pcolormesh(x, y, classes, cmap=ListedColormap(CLASS_COLOURS), vmin=-0.5, vmax=3.5,
                     shading="nearest", edgecolors="none", rasterized=True)
     axes.grid(False)
-
-
-def list_class_handles(present: Sequence[int]) -> list[Patch]:
-    return [Patch(color=CLASS_COLOURS[place], label=CLASS_NAMES[place]) for place in present]

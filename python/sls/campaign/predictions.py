@@ -26,17 +26,12 @@ def calc_swing(load_mass_kg: float) -> float:
                          / (QUAD_MASS_KG * ROD_LENGTH_M)))
 
 
-def calc_mass_ratio(load_mass_kg: float, believed_kg: float = LOAD_MASS_KG) -> float:
-    """r: the total mass divided by the total mass that the controller assumes."""
-    return (QUAD_MASS_KG + load_mass_kg) / (QUAD_MASS_KG + believed_kg)
-
-
 def make_chain(gains: Sequence[float], load_mass_kg: float,
                vertical: Sequence[float]) -> HorizontalChain:
     """The horizontal loop about a hover in which the load sags, because the controller assumes a load of
     0.2 kg: formula (1) of the page. `gains`: position, velocity, acceleration, jerk; `vertical`:
     position, velocity."""
-    ratio = calc_mass_ratio(float(load_mass_kg))
+    ratio = (QUAD_MASS_KG + float(load_mass_kg)) / (QUAD_MASS_KG + LOAD_MASS_KG)  # r, of the total masses
     slope = vertical[1] * (ratio - 1.0)
     bend = (vertical[1]**2 - vertical[0]) * (1.0 - ratio)
     return HorizontalChain(gains[0] / ratio, gains[1] / ratio,

@@ -2,9 +2,10 @@
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
-from sls.campaign.maps import (calc_share, draw_classes, draw_share, list_class_handles, list_values, make_figure,
-                               to_map)
+from sls.campaign.maps import (CLASS_COLOURS, CLASS_NAMES, calc_share, draw_classes, draw_share, list_values,
+                               make_figure, to_map)
 from sls.campaign.pairs import Pairs, describe_changes, find_pairs
 from sls.campaign.predictions import (GRAVITY_M_S2, LOAD_MASS_KG, QUAD_MASS_KG, ROD_LENGTH_M, calc_delay_limit,
                                       calc_lqr_gains, calc_pulse_peak, calc_vertical_limit)
@@ -26,8 +27,7 @@ def study_mass_and_delay(table: RunTable) -> tuple[Figure, dict[str, str]]:
     gains = calc_lqr_gains(10.0, 4)
     vertical = calc_lqr_gains(5.0, 2)
     limits = np.array([calc_delay_limit(gains, mass, 0.0, vertical) for mass in masses])
-    sag_gain = vertical[0]
-    sag_mass = LOAD_MASS_KG + ROD_LENGTH_M * sag_gain * (QUAD_MASS_KG + LOAD_MASS_KG) / GRAVITY_M_S2
+    sag_mass = LOAD_MASS_KG + ROD_LENGTH_M * vertical[0] * (QUAD_MASS_KG + LOAD_MASS_KG) / GRAVITY_M_S2
 
     figure, (axes,) = make_figure(1, "Load mass and delay: what the QSF law survives", 7.6, 4.6)
     draw_classes(axes, masses, delays, classes.T)
@@ -36,8 +36,8 @@ def study_mass_and_delay(table: RunTable) -> tuple[Figure, dict[str, str]]:
                  label="linear: sags by a rod length")
     axes.axvline(LOAD_MASS_KG, color="#444444", linewidth=0.8, linestyle=":")
     axes.set(xlabel="mass of the load (kg); the controller assumes 0.2", ylabel="delay of the command (s)")
-    axes.legend(handles=[*list_class_handles(range(4)), *axes.lines[:2]], loc="upper left",
-                bbox_to_anchor=(1.0, 1.0))
+    patches = [Patch(color=colour, label=name) for colour, name in zip(CLASS_COLOURS, CLASS_NAMES)]
+    axes.legend(handles=[*patches, *axes.lines[:2]], loc="upper left", bbox_to_anchor=(1.0, 1.0))
 
     held = ~np.all(outcome != 0, axis=1)
     stable = np.array([row.argmin() for row in decays])  # first delay that does not decay
@@ -233,7 +233,6 @@ def study_law_comparison(table: RunTable) -> tuple[Figure, dict[str, str]]:
     delay = table.numbers["faults.0.delay.by_s"]
     laws = [place for word in ("qsf", "pid") for place in range(2) if f'"{word}"' in words[place]]
     figure, (left, right) = make_figure(2, "QSF and PID at rest, the same disturbances", 9.6, 3.9)
-    everything = np.ones(len(table), dtype=bool)
     for law, name, colour in zip(laws, ("qsf", "pid"), (colour_of(0), colour_of(1))):
         draw_share(left, table, "faults.0.delay.by_s", np.arange(-0.006, 0.31, 0.016),
                    (places == law) & (table.numbers["_gust_n"] < 0.8), colour, name)
@@ -250,7 +249,7 @@ def study_law_comparison(table: RunTable) -> tuple[Figure, dict[str, str]]:
         raise InputError(f"{table.file}: expected pairs of both laws, got none")
     in_qsf, in_pid = (found.in_a, found.in_b) if laws[0] == 0 else (found.in_b, found.in_a)
     pairs = Pairs(table, table, in_qsf, in_pid, "qsf", "pid")
-    shares = [calc_share(table, (places == law) & everything)[0] for law in laws]
+    shares = [calc_share(table, places == law)[0] for law in laws]
     late_pid = delay[(places == laws[1]) & (table.outcome == 0)]
     calm = (places == laws[0]) & (table.numbers["_gust_n"] < 0.8)
     not_borne = delay[calm & (table.outcome != 0)].min()
