@@ -9,6 +9,7 @@
 #include "common/config/numbers.hpp"
 #include "common/config/scenario_reader.hpp"
 #include "common/config/scenario_writer.hpp"
+#include "common/text/regular_file.hpp"
 #include "common/text/sha256.hpp"
 
 namespace sls::config {
@@ -276,25 +277,24 @@ void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
 
 }  // namespace
 
-std::string read_config_file(const std::filesystem::path& file, const std::string& kind) {
+std::string read_config_file(const std::filesystem::path& file, const std::string& kind,
+                             std::size_t most) {
   namespace fs = std::filesystem;
   const auto fail = [&](const std::string& expectation, const std::string& found) {
     throw make_error(file.string(), 0, "", "expected " + expectation + ", got " + found);
   };
+  std::ifstream stream;
+  try {
+    stream = text::open_regular_file(file);
+  } catch (const text::NoRegularFile& error) {
+    fail(kind, error.what());
+  }
   std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status)) fail(kind, "none (" + error.message() + ")");
-  if (fs::is_directory(status)) fail(kind, "a directory");
-  if (!fs::is_regular_file(status)) fail(kind, "a pipe, socket or device");
-
-  const std::string size_limit = "at most " + std::to_string(kMaxScenarioBytes) + " bytes";
   const std::uintmax_t size = fs::file_size(file, error);
   if (error) fail(kind, error.message());
-  if (size > kMaxScenarioBytes) fail(size_limit, std::to_string(size));
+  if (size > most) fail("at most " + std::to_string(most) + " bytes", std::to_string(size));
 
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail("a readable file", std::generic_category().message(errno));
-  std::string text(kMaxScenarioBytes + 1, '\0');  // one more, in case it has grown meanwhile
+  std::string text(static_cast<std::size_t>(size), '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) fail("a readable file", std::generic_category().message(errno));
   text.resize(static_cast<std::size_t>(stream.gcount()));

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/config/config_error.hpp"
+#include "common/config/yaml_node.hpp"
 #include "control_client/laws/qsf/lqr.hpp"
 #include "python/bindings/bindings.hpp"
 #include "recorder/recording_reader.hpp"
@@ -88,11 +89,16 @@ py::list read_table(const std::string& path, const std::string& header,
     while (file.next())
       for (std::size_t i = 0; i < columns.size(); ++i) {
         const std::string_view field = file.fields()[i];
+        if (columns[i].is_text && !config::is_utf8(std::string(field)))
+          throw config::ConfigError(file.place() + file.columns()[i] +
+                                    ": expected UTF-8 text, got '" +
+                                    config::to_printable(std::string(field)) + "'");
         if (columns[i].is_text)
           columns[i].add_text(field);
         else if (!columns[i].add_number(field))
           throw config::ConfigError(file.place() + file.columns()[i] +
-                                    ": expected a number, got '" + std::string(field) + "'");
+                                    ": expected a number, got '" +
+                                    config::to_printable(std::string(field)) + "'");
       }
   } catch (const record::DamagedError& error) {
     throw config::ConfigError(error.what());

@@ -87,6 +87,8 @@ def read_paper(text: str) -> float:
 def report(options: argparse.Namespace) -> None:
     page = make_report(Recording(options.recording), options.vehicle)
     file = options.recording / "report.html"
+    if file.exists() and not file.is_file():  # a pipe would wait for a reader
+        raise InputError(f"{file}: expected a file or none, got another kind")
     try:
         file.write_text(page)
     except OSError as error:

@@ -1,19 +1,20 @@
 """Reads recordings: complete, cut short, or in several segments."""
 
-import json
 import operator
 import os
+from collections import deque
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
+from sls.campaign.yaml_nodes import parse_yaml
 from sls.columns import Columns
 from sls.core import load_core
 from sls.csv_tables import read_records, read_table, read_text
+from sls.strict_files import COUNT, check_shape, read_json
 from sls.trajectory import Stage, Trajectory, find_stages, read_body, read_cable
 from sls.vehicle_columns import VehicleColumns
 from sls.input_error import InputError
@@ -24,6 +25,18 @@ COLUMNS = {
     "command.csv": ("vehicle_id", "step", "force_x_n", "force_y_n", "force_z_n", "fault"),
     "reference.csv": ("vehicle_id", "step", "stage", "stage_name", "ref_x_m", "ref_y_m", "ref_z_m"),
 }
+MOST_VEHICLES = 256
+MOST_SCENARIO_BYTES = 32768
+MANIFEST = {  # the keys that this package reads
+    "complete": bool, "outcome": str, "reason": str, "run_id": str, "scenario": str, "vehicle_ids": [range(2**32)],
+    "period_s": float, "mode": str, "missing": [{"vehicle_id": COUNT, "topic": str, "from": COUNT, "to": COUNT}],
+    "further_missing?": {"samples": COUNT}, "segment?": {"first_step": COUNT}, "last_step?": COUNT, "step_s?": float,
+    "stage_starts?": [{"vehicle_id": COUNT, "stage": COUNT, "step": COUNT}], "certificate?": str, "timing?": str,
+    "versions?": dict, "machine?": dict}
+SCENARIO = {
+    "mission": [{"for_s?": float, "figure_eight?": {"period_s": float}}], "vehicle?": {"load_mass_kg?": float},
+    "plant?": {"cables?": [{"attachment_m?": (float,) * 3}], "rotor?": dict, "rotors?": [dict]},
+    "controller?": {"model?": dict, "gains?": {"lqr?": dict}}}
 
 
 @dataclass(frozen=True)
@@ -34,20 +47,18 @@ class Event:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
+    """Raises InputError."""
     path = folder / "manifest.json"
     try:
-        manifest = json.loads(path.read_text())
+        manifest = read_json(path, MANIFEST)
     except OSError as error:
         raise InputError(f"{folder}: expected a recording, got no manifest.json that can be read "
-                         f"({os.strerror(error.errno)})") from None
-    except ValueError as error:
-        raise InputError(f"{path}: expected a manifest, got: {error}") from None
-    for key, kind in (("complete", bool), ("outcome", str), ("reason", str), ("run_id", str),
-                      ("scenario", str), ("vehicle_ids", list), ("period_s", float),
-                      ("mode", str), ("missing", list)):
-        value = manifest.get(key) if isinstance(manifest, dict) else None
-        if not isinstance(value, kind):
-            raise InputError(f"{path}: {key}: expected {kind.__name__}, got {json.dumps(value)}")
+                         f"({error.strerror})") from None
+    for key, is_held, expected in (
+            ("vehicle_ids", 0 < len(manifest["vehicle_ids"]) <= MOST_VEHICLES, f"1 to {MOST_VEHICLES} ids"),
+            ("period_s", 0 < manifest["period_s"] <= 1e6, "> 0 and <= 1000000")):
+        if not is_held:
+            raise InputError(f"{path}: {key}: expected {expected}, got {str(manifest[key]):.40}")
     return manifest
 
 
@@ -201,19 +212,14 @@ class Recording(VehicleColumns):
 
     @cached_property
     def scenario_text(self) -> str:
-        text = read_text(self.folder / "scenario.yaml")
+        text = read_text(self.folder / "scenario.yaml", MOST_SCENARIO_BYTES)
         return "\n".join([*text.lines, text.rest])
 
     @cached_property
     def scenario(self) -> dict[str, Any]:
         path = self.folder / "scenario.yaml"
-        try:
-            scenario = yaml.safe_load(self.scenario_text)
-        except yaml.YAMLError as error:
-            cause = " ".join(str(error).split())
-            raise InputError(f"{path}: expected YAML, got: {cause}") from None
-        if not isinstance(scenario, dict) or not isinstance(scenario.get("mission"), list):
-            raise InputError(f"{path}: expected a scenario with a mission, got another document")
+        scenario = parse_yaml(self.scenario_text.encode(), path).to_plain()
+        check_shape(path, scenario, SCENARIO)
         return scenario
 
     def _load_table(self, name: str) -> tuple[dict[str, np.ndarray], bool]:
@@ -227,8 +233,10 @@ class Recording(VehicleColumns):
             table, is_part_cut = read_table(folder / name, columns)
             is_cut |= is_part_cut
             if number + 1 < len(self.segments):
-                is_used = table["step"] < self.segments[number + 1][1]["segment"]["first_step"]
+                is_used = table["step"] < self.segments[number + 1][1].get("segment", {}).get("first_step", 0)
                 table = {column: values[is_used] for column, values in table.items()}
+            if parts and (missing := parts[0].keys() - table.keys()):
+                raise InputError(f"{folder / name}:1: expected a column '{min(missing)}', as in segment 1")
             parts.append(table)
         joined = parts[0] if len(parts) == 1 else {
             column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
@@ -316,8 +324,7 @@ class Recording(VehicleColumns):
     def _find_plan(self, stage: int) -> dict[str, Any]:
         """The keys of a stage in the scenario."""
         mission = self.scenario["mission"]
-        planned = mission[stage] if stage < len(mission) else {}
-        return planned if isinstance(planned, dict) else {}
+        return mission[stage] if 0 <= stage < len(mission) else {}
 
     def list_notes(self) -> tuple[str, ...]:
         """Notes on the recording: incomplete, samples missing, rows cut off, further runs in the folder."""
@@ -359,8 +366,8 @@ class Recording(VehicleColumns):
     def read_last_status(self) -> dict[str, str]:
         """The last row of status.csv; empty if there is none. The last segments may have no rows."""
         for folder, _ in reversed(self.segments):
-            if rows := read_records(folder / "status.csv"):
-                return rows[-1]
+            if last := deque(read_records(folder / "status.csv"), 1):
+                return last[0]
         return {}
 
 

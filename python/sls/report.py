@@ -2,6 +2,7 @@
 
 import base64
 import html
+import math
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -224,7 +225,7 @@ def describe_load_mass(scenario: dict[str, Any], vehicle: dict[str, Any], carrie
     share = vehicle.get("load_mass_kg", "–")
     if len(carriers) < 2:
         return f"{share} kg"
-    whole = sum(find_vehicle(scenario, carrier)["load_mass_kg"] for carrier in carriers)
+    whole = sum(find_vehicle(scenario, carrier).get("load_mass_kg", math.nan) for carrier in carriers)
     return f"{whole:g} kg, of it {share} kg the share of this vehicle"
 
 
