@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <thread>
 
+#include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "common/bus/end_process.hpp"
 #include "common/bus/node.hpp"
@@ -52,6 +53,7 @@ int main(int argc, char** argv) {
 
   const int code = app::run_main(argc, argv, cli, options, "sim_server", [&] {
     config::Scenario scenario = config::load_scenario(scenario_file);
+    if (!scenario.warning.empty()) app::log({true, scenario.warning});
     if (period_s) config::override_period(scenario, *period_s);
     if (!mode.empty())
       scenario.sync.mode =

@@ -96,6 +96,8 @@ Line describe_crash(const ThreadRecord& record, int number) {
       .add(")");
 }
 
+struct sigaction earlier_bus {};  // what SIGBUS did outside of libraries
+
 void report_crash(int number) {
   if (is_inside_library(current)) {
     // Out of the handler, so that the last words may allocate: CallGuard::after_crash.
@@ -108,6 +110,7 @@ void report_crash(int number) {
   // SA_RESETHAND has restored the default action, so the second signal ends the process. abort()
   // itself raises SIGABRT again.
   if (number == SIGABRT) return;
+  if (number == SIGBUS) ::sigaction(number, &earlier_bus, nullptr);
   ::raise(number);
 }
 
@@ -145,7 +148,7 @@ class Watchdog {
     action.sa_handler = &report_crash;
     action.sa_flags = static_cast<int>(SA_RESETHAND | SA_ONSTACK);
     for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT})
-      ::sigaction(number, &action, nullptr);
+      ::sigaction(number, &action, number == SIGBUS ? &earlier_bus : nullptr);
     std::thread([this] { watch(); }).detach();
   }
 
