@@ -4,6 +4,7 @@ The launcher runs in a small checkout. Stand-ins for what sets up and builds rec
 
 import contextlib
 import io
+import itertools
 import json
 import os
 import pathlib
@@ -12,6 +13,7 @@ import re
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -140,6 +142,17 @@ class AnswersTest(unittest.TestCase):
         self.assertEqual([line for line in said.splitlines() if len(line) > 80], [])
         self.assertEqual(len(names), sum(map(len, (list_names("scenarios"), list_names("campaigns"), listing.LAWS,
                                                    listing.PLANTS))) - 1)
+
+    def test_every_encoding_and_a_reader_that_has_gone_are_no_error(self):
+        ours, theirs = os.pipe()
+        os.close(ours)
+        for command, encoding, out in itertools.product(("help", "list"), ("ascii", "latin-1", "utf-8"),
+                                                        (subprocess.PIPE, theirs)):
+            with self.subTest(command, encoding=encoding):
+                done = subprocess.run([sys.executable, "-B", ROOT / "python/sls/launcher/__main__.py", command], stdout=out,
+                                      stderr=subprocess.PIPE, env={**os.environ, "PYTHONIOENCODING": encoding}, check=False)
+                self.assertEqual((done.returncode, done.stderr), (0, b""))
+        os.close(theirs)
 
     def test_the_summary_for_machines_is_one_line_of_json(self):
         with tempfile.TemporaryDirectory() as folder:
