@@ -60,6 +60,8 @@ MISTAKES = {
     "discovery-server --port 0": "--port: expected 1 to 65535, got '0' (see ./sls discovery-server --help)",
     "test --sanitize addr": "--sanitize: expected address or thread, got 'addr' (see ./sls test --help)",
     "build everything": "build: expected no argument, got 'everything' (see ./sls build --help)",
+    "report many": "many: expected a recording, got a folder of 1; the newest: many/a",
+    "verify a many": "many: expected a recording, got a folder of 1; the newest: many/a",
     "fuzz --target cvs": "--target: expected scenario, faults, qos_file, csv, recording, samples, foxglove or web, got 'cvs' (see ./sls fuzz "
                          "--help)",
 }
@@ -73,6 +75,7 @@ class MistakesTest(checkout.CheckoutTest):
         super().setUp()
         for name in ("cmake", "ninja", "dpkg-query", "apt-get", "node", "npm"):
             self.stand_in(name, "exit 1")
+        self.write("many/a/manifest.json", "{}")
 
     def launch(self, *words, **variables):
         return subprocess.run([self.root / "sls", *words], cwd=self.folder, env={**self.environment, **variables},
@@ -91,6 +94,10 @@ class MistakesTest(checkout.CheckoutTest):
 
     def test_a_bad_variable_is_named(self):
         self.expect_refused("SLS_DOMAIN: expected 0 to 232, got 'abc'", "run", "short", SLS_DOMAIN="abc")
+
+    def test_a_folder_without_a_place_for_recordings_is_refused_with_the_option(self):
+        self.write("recordings", "a file")
+        self.expect_refused("recordings: expected a folder to write in, got none here (--out DIR names another)", "run", "short")
 
     def test_a_build_without_programs_is_named(self):
         done = subprocess.run([self.root / "sls", "run", "short"], env={**os.environ, "SLS_BUILD": str(self.folder)},
@@ -132,14 +139,16 @@ class AnswersTest(unittest.TestCase):
         self.assertEqual(launch("--version").stdout, f"sls {version}\n")
         self.assertEqual(__version__, version)
 
-    def test_the_list_has_every_name_and_fits_the_terminal(self):
+    def test_the_list_has_every_name_and_fits_the_terminal_but_is_whole_in_a_pipe(self):
+        shown = subprocess.run(["script", "-qc", f"stty cols 80; {ROOT}/sls list", "/dev/null"], capture_output=True, text=True).stdout
+        self.assertEqual([line for line in shown.splitlines() if len(line) > 80], [])
         said = launch("list").stdout
+        self.assertNotIn("…", said)
         names = set(re.findall(r"^  (\S+) {2,}\S", said, re.MULTILINE))
         for file, kind in (("control_client/laws/laws.def", "LAW"), ("sim_server/plants/plants.def", "PLANT")):
             own = set(re.findall(rf"^SLS_{kind}\((\w+)\)", (ROOT / file).read_text(), re.MULTILINE))
             self.assertEqual(own - names, set())
         self.assertEqual({*list_names("scenarios"), *list_names("campaigns")} - names, set())
-        self.assertEqual([line for line in said.splitlines() if len(line) > 80], [])
         self.assertEqual(len(names), sum(map(len, (list_names("scenarios"), list_names("campaigns"), listing.LAWS,
                                                    listing.PLANTS))) - 1)
 
@@ -153,6 +162,14 @@ class AnswersTest(unittest.TestCase):
                                       stderr=subprocess.PIPE, env={**os.environ, "PYTHONIOENCODING": encoding}, check=False)
                 self.assertEqual((done.returncode, done.stderr), (0, b""))
         os.close(theirs)
+
+    def test_two_flights_that_differ_because_of_their_scenarios_are_named_so(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for name in ("short", "mission"):
+                launch("run", name, "--in-process", "--out", name, cwd=folder)
+            done = launch("verify", "short", "mission", cwd=folder, code=1)
+        self.assertEqual(done.stderr, "sls_verify: error: A and B are flights of different scenarios\n")
+        self.assertNotIn("largest difference", done.stdout)
 
     def test_the_summary_for_machines_is_one_line_of_json(self):
         with tempfile.TemporaryDirectory() as folder:

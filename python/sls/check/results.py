@@ -175,21 +175,24 @@ def describe(error: Exception) -> str:
 HEAD = ("check", "placement", "expectation", "value", "bound", "margin", "worst at", "verdict")
 
 
-def make_rows(results: Sequence[Result]) -> list[str]:
-    """A line for each expectation, in columns. A flight that could not be judged has one line."""
+def make_rows(results: Sequence[Result], width: int = 10**6) -> list[str]:
+    """A line of at most `width` letters for each expectation, in columns. A flight that could not be judged has one
+    line. The widest columns are shortened first."""
     rows = [list(HEAD)]
     for result in results:
         for one in result.judged:
             value = one.got if one.problem or isinstance(one.value, str) else f"{one.value:.4g} {one.unit}".rstrip()
             margin = "" if one.margin is None else f"{one.margin:.3g}"
-            rows.append([result.check, result.flight, shorten(one.text, 60), shorten(value), one.bound, margin, one.where,
+            rows.append([result.check, result.flight, one.text, value, one.bound, margin, one.where,
                          HELD if one.is_held else "NOT HELD"])
         if result.problem or result.difference:
             text = shorten(result.problem or result.difference)
             verdict = "NOT HELD" if result.verdict == NOT_HELD else result.verdict
             rows.append([result.check, result.flight, "(flight)", text, "", "", "", verdict])
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows]
+    while sum(widths) + 2 * (len(widths) - 1) > width and max(widths) > len("expect…"):
+        widths[widths.index(max(widths))] -= 1
+    return ["  ".join(shorten(cell, most).ljust(most) for cell, most in zip(row, widths)).rstrip() for row in rows]
 
 
 def shorten(text: str, most: int = 40) -> str:

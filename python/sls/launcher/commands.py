@@ -17,7 +17,7 @@ from sls.launcher.docker_demo import docker_demo
 from sls.launcher.fuzzing import fuzz
 from sls.launcher.listing import print_list
 from sls.launcher.place import (BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, IS_OF_PIP, PYTHON_PATH, ROOT, SELF, STRAY_VARIABLES, Failure,
-                                find_file, list_choices, say, suggest)
+                                expect_no_folder_of_recordings, find_file, list_choices, say, suggest)
 
 USAGE = """\
 usage: ./sls COMMAND [OPTIONS]
@@ -334,6 +334,9 @@ def check_words(command: str, words: list[str]) -> None:
             takes_value = bool(known.get(word, ("",))[0])
     if command == "ctl" and others and others[0] not in CONTROLS:
         raise Failure(f"ctl: expected {list_choices(CONTROLS)}, got '{others[0]}'{suggest(others[0], CONTROLS)}", 2)
+    if command in ("convert", "plot", "report", "verify", "view"):
+        for name in others:
+            expect_no_folder_of_recordings(name)
     if command == "campaign" and len(others) == 1:
         find_file("campaigns", others[0])
 

@@ -46,6 +46,12 @@ def drop(descriptor: int) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
 
 
+def find_width() -> int:
+    """Columns of the terminal on standard output. A pipe and a file take lines of any length."""
+    import shutil  # takes longer to load than this module
+    return shutil.get_terminal_size().columns if sys.stdout and sys.stdout.isatty() else 10**6
+
+
 SIGNS = {"≤": "<=", "≥": ">=", "…": "...", "×": "x", "–": "-"}
 
 
@@ -85,6 +91,15 @@ def suggest(word: str, names: Iterable[str]) -> str:
     """The end of an error line: the name that is nearest to the word, if one is near."""
     near = difflib.get_close_matches(word, list(names), 1, 0.65)
     return f"; did you mean '{near[0]}'?" if near else ""
+
+
+def expect_no_folder_of_recordings(name: str) -> None:
+    """Raises Failure, which names the newest recordings in the folder."""
+    found = [file.parent for file in Path(name).glob("*/manifest.json")]
+    if found and not Path(name, "manifest.json").exists():
+        newest = sorted(found, key=lambda folder: folder.stat().st_mtime, reverse=True)[:3]
+        raise Failure(f"{name}: expected a recording, got a folder of {len(found)}; the newest: "
+                      + ", ".join(map(str, newest)), 2)
 
 
 def find_file(kind: str, name: str) -> str:
