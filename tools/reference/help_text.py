@@ -30,8 +30,8 @@ class Help:
     subcommands: list
 
     def list_own(self):
-        """Arguments and options but --help."""
-        return self.positionals + [option for option in self.options if "--help" not in option.names]
+        """Arguments and options but those of every program."""
+        return self.positionals + [option for option in self.options if option.names[-1] not in ("--help", "--version")]
 
 
 def parse_item(spec, text):

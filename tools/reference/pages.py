@@ -151,7 +151,7 @@ First the commands of `./sls`, then the programs that they start. Each text is w
                     f"{item.names[0]}: {item.text}" for item in its_help.positionals])]
                 for its_help in subcommands.values()])
         for subcommand, its_help in subcommands.items():
-            if any(item.is_option for item in its_help.list_own()):
+            if any(item.names[0].startswith("-") for item in its_help.list_own()):
                 text += describe_help(f"{name} {subcommand}", its_help, 3)
     return text
 

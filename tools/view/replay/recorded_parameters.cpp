@@ -54,7 +54,7 @@ void set_columns(Parameters& message, const fs::path& folder,
     SignalDescription& signal = message.signals().emplace_back();
     signal.name(file.columns()[index]);
     for (const record::ManifestFile::Signal& of_manifest : manifest.signals)
-      if (of_manifest.name == signal.name()) signal.unit(of_manifest.unit);
+      if (of_manifest.name == file.columns()[index]) signal.unit(of_manifest.unit);
   }
 }
 
