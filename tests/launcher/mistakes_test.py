@@ -69,7 +69,7 @@ MISTAKES = {
 
 class MistakesTest(checkout.CheckoutTest):
     maxDiff = None
-    parts = ("config", "docs/reference")
+    parts = ("config", "docs/reference", "python/sls/check", "python/sls/errors.py")
 
     def setUp(self):
         super().setUp()
@@ -104,6 +104,10 @@ class MistakesTest(checkout.CheckoutTest):
                               capture_output=True, text=True, timeout=60, check=False)
         self.assertEqual((done.returncode, done.stderr),
                          (1, f"sls: error: {self.folder}/bin/sim_server: expected a program, got no such file\n"))
+
+    def test_a_check_whose_programs_cannot_be_built_is_unusable(self):
+        self.assertEqual(self.launch("check", "short", "--junit", "junit.xml").returncode, 2)
+        self.assertIn('errors="1"', (self.folder / "junit.xml").read_text())
 
     def test_a_used_port_is_refused_before_the_flight(self):
         with socket.socket() as other:

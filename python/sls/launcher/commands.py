@@ -174,18 +174,16 @@ def campaign_worker(words: list[str]) -> NoReturn:
 
 
 def check(words: list[str]) -> NoReturn:
+    is_judging = any(word.startswith("--recording") for word in words)
+    has_pages = any(word.startswith("--report") for word in words)
     try:
         if not is_help_asked(words):
-            is_judging = any(word.startswith("--recording") for word in words)
-            has_pages = any(word.startswith("--report") for word in words)
-            build_programs("_sls_core", *([] if is_judging else [*FLYING, "sls_worlds"]),
-                           *(["sls_view"] if has_pages else []))
+            build_programs("_sls_core", *([] if is_judging else [*FLYING, "sls_worlds"]), *["sls_view"] * has_pages)
         call_script("@install", "python_packages")
     except SystemExit as error:
-        if error.code in (130, 143):
-            raise
         from sls.check.results import refuse  # the launcher alone need not load it
-        raise SystemExit(refuse(words, "expected programs that can be built, got the errors above")) from None
+        text = "expected programs that can be built, got the errors above"
+        raise error if error.code in (130, 143) else SystemExit(refuse(words, text)) from None
     replace_by_module("sls.check", *words, SLS_BUILD=str(BUILD), SLS_VIEW=str(BUILD / "bin/sls_view"))
 
 
@@ -334,9 +332,8 @@ def check_words(command: str, words: list[str]) -> None:
             takes_value = bool(known.get(word, ("",))[0])
     if command == "ctl" and others and others[0] not in CONTROLS:
         raise Failure(f"ctl: expected {list_choices(CONTROLS)}, got '{others[0]}'{suggest(others[0], CONTROLS)}", 2)
-    if command in ("convert", "plot", "report", "verify", "view"):
-        for name in others:
-            expect_no_folder_of_recordings(name)
+    for name in others if command in ("convert", "plot", "report", "verify", "view") else ():
+        expect_no_folder_of_recordings(name)
     if command == "campaign" and len(others) == 1:
         find_file("campaigns", others[0])
 

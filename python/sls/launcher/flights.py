@@ -63,11 +63,7 @@ def prepare(options: Namespace) -> None:
     if options.view_port is not None:
         check_port(options.view_port)
     if options.out is None:
-        try:
-            os.makedirs("recordings", exist_ok=True)
-        except OSError:
-            pass  # the next line says it
-        if not (os.path.isdir("recordings") and os.access("recordings", os.W_OK)):
+        if not os.access("recordings" if os.path.exists("recordings") else ".", os.W_OK) or os.path.isfile("recordings"):
             raise Failure("recordings: expected a folder to write in, got none here (--out DIR names another)", 2)
     programs = [*FLYING, *([] if options.view_port is None else ["sls_view"])]
     build_programs(*(["flight"] if options.view_port is None else programs))

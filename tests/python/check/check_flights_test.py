@@ -228,8 +228,8 @@ def test_a_controller_that_cannot_be_used_is_a_mistake(check, tmp_path, controll
     assert code == 2 and flights[0]["verdict"] == "unusable" and flights[0]["problems"][0].startswith(expected), said
 
 
-FULL, READ_ONLY = "/dev/shm: expected room for a flight, got: No space", "/dev/shm: expected room for a flight, got: Read-only"
 CHECK = f"{sys.executable} -BP -m sls.check check.yaml --junit junit.xml"
+SHM = f"{CHECK} --placement shm"
 
 
 @pytest.mark.parametrize("code, command, expected", [
@@ -237,13 +237,12 @@ CHECK = f"{sys.executable} -BP -m sls.check check.yaml --junit junit.xml"
     (0, f"PYTHONIOENCODING=latin-1 {CHECK}", "<= 0.05"),
     (0, f"{CHECK} 2>&1 | true; exit $PIPESTATUS", ""),
     (2, f"{CHECK} >/dev/full", "No space"),
-    (0, f"export ROS_DISCOVERY_SERVER=127.0.0.1:1 FASTDDS_ENVIRONMENT_FILE=none SLS_DOMAIN=x; {CHECK} --placement shm",
-     "1 held"),
+    (0, f"ROS_DISCOVERY_SERVER=127.0.0.1:1 FASTDDS_ENVIRONMENT_FILE=none SLS_DOMAIN=x {SHM}", "1 held"),
     (2, f"TMPDIR=$PWD/$'\\xff' && mkdir $TMPDIR && export TMPDIR && {CHECK}", "expected a path in UTF-8, got byte 0xff"),
-    (2, f"mkdir full && mount -t tmpfs -o size=40k none full && TMPDIR=$PWD/full {CHECK}", "room for a flight, got: No space"),
-    (2, f"mkdir full && mount -t tmpfs -o size=40k none full && TMPDIR=$PWD/full {CHECK} --placement shm", "got: No space"),
-    (2, f"mount -t tmpfs -o size=64k none /dev/shm && {CHECK} --placement shm", FULL),
-    (2, f"mount -t tmpfs -o ro none /dev/shm && {CHECK} --placement shm", READ_ONLY),
+    (2, f"mkdir full && mount -t tmpfs -o size=40k none full && TMPDIR=$PWD/full {CHECK}", "flight, got: No space"),
+    (2, f"mkdir full && mount -t tmpfs -o size=40k none full && TMPDIR=$PWD/full {SHM}", "flight, got: No space"),
+    (2, f"mount -t tmpfs -o size=64k none /dev/shm && {SHM}", "/dev/shm: expected room for a flight, got: No space"),
+    (2, f"mount -t tmpfs -o ro none /dev/shm && {SHM}", "/dev/shm: expected room for a flight, got: Read-only"),
     (0, f"mount -t tmpfs -o ro none /dev/shm && {CHECK} --placement udp", "1 held"),
     (2, f"echo raise OSError >numpy.py; PYTHONPATH=.:$PYTHONPATH {CHECK}", "OSError"),
 ])
@@ -251,7 +250,7 @@ def test_the_environment_is_not_the_controller(tmp_path, code, command, expected
     if "mount" in command and not IS_ROOT:
         pytest.skip("a file system of its own needs root")
     (tmp_path / "mine.yaml").write_text(SCENARIO.replace("for_s: 20", "for_s: 6"))
-    (tmp_path / "check.yaml").write_text("scenario: mine.yaml\nexpect:\n  - { measure: load_error_end_m, max: 0.05 }\n")
+    (tmp_path / "check.yaml").write_text("scenario: mine.yaml\nexpect: [{ measure: load_error_end_m, max: 0.05 }]\n")
     done = subprocess.run([*["unshare", "-m"] * IS_ROOT, "bash", "-c", command], cwd=tmp_path, text=True, timeout=60,
                           stdout=subprocess.PIPE, stderr=subprocess.STDOUT, errors="replace")
     assert done.returncode == code and expected in done.stdout and "Traceback" not in done.stdout, done.stdout
