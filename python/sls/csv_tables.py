@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sls.core import load_core
+from sls.core import load_core, to_core
 from sls.errors import ConfigError
 from sls.input_error import InputError
 from sls.strict_files import open_regular, read_limited
@@ -104,7 +104,7 @@ def read_table(path: Path, required: Sequence[str]) -> tuple[dict[str, np.ndarra
         if name not in names:
             raise InputError(f"{path}:1: expected a column '{name}', got '{header[:60].rstrip()}'")
     try:
-        columns = load_core().read_table(str(path), header[:-1], TEXT_COLUMNS)
+        columns = load_core().read_table(to_core(path), header[:-1], TEXT_COLUMNS)
     except ConfigError as error:
         raise InputError(str(error)) from None
     for name, column in zip(names, columns):

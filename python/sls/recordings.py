@@ -12,7 +12,7 @@ import numpy as np
 
 from sls.campaign.yaml_nodes import parse_yaml
 from sls.columns import Columns
-from sls.core import load_core
+from sls.core import load_core, to_core
 from sls.csv_tables import read_records, read_table, read_text
 from sls.strict_files import COUNT, check_shape, read_json
 from sls.trajectory import Stage, Trajectory, find_stages, read_body, read_cable
@@ -201,13 +201,13 @@ class Recording(VehicleColumns):
         """Reads every file again, as `./sls verify DIR` does. Needs the extension module.
 
         Raises RunError if a file is too damaged to be read."""
-        steps, certificate, problems = load_core().inspect_recording(str(self.folder))
+        steps, certificate, problems = load_core().inspect_recording(to_core(self.folder))
         return Verification(steps, certificate, tuple(problems))
 
     def compare(self, other: "Recording") -> Comparison:
         """Compares the data of two recordings, as `./sls verify A B` does. Needs the extension
         module. Raises RunError if a file is too damaged to be read."""
-        difference, notes = load_core().compare_recordings(str(self.folder), str(other.folder))
+        difference, notes = load_core().compare_recordings(to_core(self.folder), to_core(other.folder))
         return Comparison(difference, tuple(notes))
 
     @cached_property

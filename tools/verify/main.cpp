@@ -30,6 +30,8 @@ void verify_two(const OpenedRecording& a, const OpenedRecording& b) {
   for (const std::string& note : record::list_notes(a, b)) std::cout << note << '\n';
   if (const auto difference = record::find_first_difference(a, b)) {
     std::cout << "first difference: " << difference->text << '\n';
+    if (a.manifest().scenario_sha256 != b.manifest().scenario_sha256)
+      throw app::RunError("A and B are flights of different scenarios");
     const auto deviations = record::list_deviations(a, b);
     if (!deviations.empty()) std::cout << "largest difference of each column that differs:\n";
     for (const auto& deviation : deviations) std::cout << "  " << describe(deviation) << '\n';

@@ -62,6 +62,9 @@ def prepare(options: Namespace) -> None:
             raise Failure(f"SLS_DOMAIN: {error}", 2) from None
     if options.view_port is not None:
         check_port(options.view_port)
+    if options.out is None:
+        if not os.access("recordings" if os.path.exists("recordings") else ".", os.W_OK) or os.path.isfile("recordings"):
+            raise Failure("recordings: expected a folder to write in, got none here (--out DIR names another)", 2)
     programs = [*FLYING, *([] if options.view_port is None else ["sls_view"])]
     build_programs(*(["flight"] if options.view_port is None else programs))
     for program in programs:

@@ -14,8 +14,13 @@ import sls
 from sls.check.check_file import load_check
 from sls.check.cli import main
 from sls.check.difference import find_difference
-from sls.check.judge import judge, open_recording
-from sls.check.results import Result, write_json, write_junit
+from sls.check.judge import Judged, judge, open_recording
+from sls.check.results import Result, make_rows, write_json, write_junit
+
+
+def test_the_table_fits_a_terminal_and_is_whole_in_a_pipe():
+    results = [Result("gazebo_corrected", "", "in-process", judged=[Judged("load_error_max_m, stage 3", True, "x" * 64)])]
+    assert [len(line) for line in make_rows(results, 80)] == [80, 77] and "x" * 64 in make_rows(results)[1]
 
 
 @pytest.fixture(scope="module")
