@@ -17,6 +17,7 @@ from sls.csv_tables import read_records, read_table, read_text
 from sls.trajectory import Stage, Trajectory, find_stages, read_body, read_cable
 from sls.vehicle_columns import VehicleColumns
 from sls.input_error import InputError
+from sls.launcher.place import escape_controls
 
 COLUMNS = {
     "state.csv": ("vehicle_id", "step", "sim_time_s", "quad_x_m", "quad_y_m", "quad_z_m",
@@ -184,7 +185,7 @@ class Recording(VehicleColumns):
     def __repr__(self) -> str:
         manifest = self.manifest
         end = manifest["reason"] or manifest["outcome"] if manifest["complete"] else "incomplete"
-        return f"<sls.Recording {self.folder}: {manifest['scenario']}, {end}>"
+        return escape_controls(f"<sls.Recording {self.folder}: {manifest['scenario']}, {end}>")
 
     def verify(self) -> Verification:
         """Reads every file again, as `./sls verify DIR` does. Needs the extension module.

@@ -17,6 +17,7 @@ from sls.campaign import studies, team_studies
 from sls.campaign.run_table import read_runs
 from sls.figures import STYLE, save
 from sls.input_error import InputError
+from sls.launcher.place import say
 
 HERE = Path(__file__).resolve().parent
 STUDIES = {"mass_and_delay": studies.study_mass_and_delay, "gains": studies.study_gains, "wind": studies.study_wind,
@@ -46,9 +47,9 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--out", type=Path, default=HERE.parents[2] / "docs", metavar="DIR")
     options = parser.parse_args(arguments)
     try:
-        print(f"sls: campaigns: {write_findings(options.campaigns, options.out)}", file=sys.stderr)
+        say(f"campaigns: {write_findings(options.campaigns, options.out)}")
     except InputError as error:
-        print(f"sls: error: {error}", file=sys.stderr)
+        say(f"error: {error}")
         return 2
     return 0
 

@@ -20,7 +20,7 @@ from sls.check.judge import judge, open_recording
 from sls.check.results import HELD, Result, find_code, make_rows, write_json, write_junit
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
-from sls.launcher.place import say
+from sls.launcher.place import say, show
 
 MOST_LOG_LINES = 30
 MEANING = "Flies the scenario of each check file and judges its recording."
@@ -239,10 +239,10 @@ def print_results(results: Sequence[Result]) -> None:
     shown = {(one.check, one.placement, *one.list_problems()): one for one in reversed(results) if one.placement}
     shown = list(reversed(shown.values()))
     for line in make_rows(shown):
-        print(line)
+        show(line)
     for one in shown:
         for problem in one.list_problems():
-            print(f"{one.name}: {problem}")
+            show(f"{one.name}: {problem}")
     verdicts = [one.verdict for one in results]
     words = ", ".join(f"{verdicts.count(word)} {word}" for word in dict.fromkeys((HELD, *sorted(verdicts)))
                       if verdicts.count(word))

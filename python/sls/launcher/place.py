@@ -2,6 +2,7 @@
 
 import difflib
 import os
+import re
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -28,9 +29,23 @@ class Failure(Exception):
         self.code = code
 
 
+# C0, DEL, C1, separators of lines, changes of direction, bytes that are not UTF-8.
+CONTROLS = re.compile("[\0-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def escape_controls(text: object) -> str:
+    """`text`, which may be of a file or of the network, in one line that cannot control a terminal."""
+    return CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode(), str(text))
+
+
 def say(text: str) -> None:
-    text = text.replace("see ./sls", f"see {SELF}")
+    text = escape_controls(text).replace("see ./sls", f"see {SELF}")
     print(f"sls: {text}", file=sys.stderr, flush=True)
+
+
+def show(text: str) -> None:
+    """Prints `text`, which may have several lines, on standard output."""
+    print("\n".join(map(escape_controls, text.split("\n"))))
 
 
 def list_names(kind: str) -> list[str]:
