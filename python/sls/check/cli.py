@@ -17,7 +17,7 @@ from sls.check.difference import find_difference
 from sls.check.faults import PLACEMENTS, WORDS, Fault, check_able, parse_fault
 from sls.check.flights import fly
 from sls.check.judge import judge, open_recording
-from sls.check.results import HELD, Result, find_code, make_rows, write_json, write_junit
+from sls.check.results import HELD, Result, count_verdicts, find_code, make_rows, write_json, write_junit
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
 from sls.launcher.place import say, show
@@ -243,12 +243,9 @@ def print_results(results: Sequence[Result]) -> None:
     for one in shown:
         for problem in one.list_problems():
             show(f"{one.name}: {problem}")
-    verdicts = [one.verdict for one in results]
-    words = ", ".join(f"{verdicts.count(word)} {word}" for word in dict.fromkeys((HELD, *sorted(verdicts)))
-                      if verdicts.count(word))
     flown = [(one.check, one.certificate) for one in results if one.certificate]
     are_same = len(set(flown)) == len({check for check, _ in flown}) < len(flown)
-    print(f"{len(results)} flight{'s' if len(results) > 1 else ''}: {words}"
+    print(count_verdicts(results)
           + ("; the flights of each check have equal bytes" if are_same else ""))
 
 
