@@ -4,6 +4,7 @@ import base64
 import html
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -122,8 +123,10 @@ def make_report(recording: Recording, vehicle_id: int, first: Sequence[str] = ()
     """The page as HTML. The scene may use the rest of MOST_BYTES. `first`: sections below the head. `marks`: times in s
     that the figures mark, with what happens then. `verdict`: the badge of a check. Raises InputError."""
     name = recording.manifest["scenario"]
-    flight = recording.load_flight(vehicle_id, name)
     fleet = recording.load_fleet()
+    if vehicle_id not in recording.vehicle_ids:
+        recording.load_flight(vehicle_id, name)
+    flight = replace(fleet[recording.vehicle_ids.index(vehicle_id)], name=name)
     title = f"{name}, vehicle {vehicle_id}" if len(fleet) > 1 else name
     sections = [
         make_head(recording, flight, title, verdict) + "".join(first),

@@ -38,8 +38,8 @@ def escape_controls(text: object) -> str:
     return CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode(), str(text))
 
 
-def say(text: str) -> None:
-    text = escape_controls(text).replace("see ./sls", f"see {SELF}")
+def say(*lines: str) -> None:
+    text = "\n".join(map(escape_controls, lines)).replace("see ./sls", f"see {SELF}")
     print(f"sls: {text}", file=sys.stderr, flush=True)
 
 
