@@ -67,9 +67,9 @@ int main(int argc, char** argv) {
       bus::check_security_files(bus::read_qos_file(options.qos_file, kIdentity));
       const bool is_lockstep = scenario.sync.mode == config::SyncMode::kLockstep;
       const std::size_t count = assignment.vehicle_ids.size();
-      fmt::print("{}: {}, {} vehicle{}, period {} s\n", scenario.name,
-                 is_lockstep ? "lockstep" : "real time", count, count > 1 ? "s" : "",
-                 scenario.sync.period_ns * 1e-9);
+      app::print(fmt::format("{}: {}, {} vehicle{}, period {} s", scenario.name,
+                             is_lockstep ? "lockstep" : "real time", count, count > 1 ? "s" : "",
+                             scenario.sync.period_ns * 1e-9));
       return;
     }
     bus::Node node(options.qos_file, options.domain, bus::kServerNode, kIdentity);

@@ -55,7 +55,7 @@ def plot(options: argparse.Namespace) -> None:
         recording = Recording(source)
         flights.append(load_recording(recording, name, options.vehicle))
         if len(names) == 1:
-            fleet = recording.load_fleet()
+            fleet = recording.load_fleet() if len(recording.vehicle_ids) > 1 else []
             out = options.out or source / "figures"
     figures = make_figures(flights, fleet, options.paper, dict(options.panels) if options.panels else None)
     if not figures:

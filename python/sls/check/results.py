@@ -71,6 +71,13 @@ class Result:
                 "expectations": [to_finite(asdict(one)) for one in self.judged]}
 
 
+def count_verdicts(results: Sequence[Result]) -> str:
+    """`3 flights: 2 held, 1 not held`."""
+    verdicts = [one.verdict for one in results]
+    words = ", ".join(f"{verdicts.count(word)} {word}" for word in CODES if word in verdicts)
+    return f"{len(results)} flight{'s' if len(results) != 1 else ''}: {words}"
+
+
 def find_code(results: Sequence[Result]) -> int:
     return max((CODES[result.verdict] for result in results), default=0)
 
