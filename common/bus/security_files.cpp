@@ -166,25 +166,9 @@ Expiry find_expiry(const std::string& file, const X509& certificate) {
   return {file, ::timegm(&time)};
 }
 
-/// Certificates of the identities in the folders beside that of `certificate_file`.
-std::vector<Expiry> find_others(const std::filesystem::path& certificate_file) {
-  std::vector<Expiry> found;
-  std::error_code error;
-  const auto keys = certificate_file.parent_path().parent_path();
-  for (const auto& folder : std::filesystem::directory_iterator(keys, error)) {
-    const std::string file = folder.path() / certificate_file.filename();
-    if (!std::filesystem::is_regular_file(file, error) || file == certificate_file) continue;
-    const Stream stream(BIO_new_file(file.c_str(), "r"));
-    const Certificate certificate(
-        stream ? PEM_read_bio_X509(stream.get(), nullptr, nullptr, nullptr) : nullptr);
-    if (certificate) found.push_back(find_expiry(file, *certificate));
-  }
-  ERR_clear_error();
-  return found;
-}
-
 /// The line about the file that ends first, if that is within 30 days.
-std::string describe_first(const std::vector<Expiry>& all, std::time_t now) {
+std::string describe_first(const std::vector<Expiry>& all) {
+  const std::time_t now = std::time(nullptr);
   const auto first = std::min_element(all.begin(), all.end(),
                                       [](const auto& a, const auto& b) { return a.at < b.at; });
   constexpr std::time_t kDay = 24 * 60 * 60;
@@ -265,15 +249,11 @@ SecurityFiles check_security_files(const std::string& profiles) {
 
   const std::string authority = file_of(std::string(kAccess) + "permissions_ca");
   verify_document(file_of(std::string(kAccess) + "governance"), authority);
-  std::vector<Expiry> expiries = {find_expiry(certificate_file, *certificate),
-                                  check_permissions(file_of(std::string(kAccess) + "permissions"),
-                                                    authority, find_subject(*certificate)),
-                                  find_expiry(issuer, *read_certificate(issuer)),
-                                  find_expiry(authority, *read_certificate(authority))};
-  const std::time_t now = std::time(nullptr);
-  const std::string own = describe_first(expiries, now);
-  for (Expiry& other : find_others(certificate_file)) expiries.push_back(std::move(other));
-  return {true, own, describe_first(expiries, now)};
+  return {true, describe_first({find_expiry(certificate_file, *certificate),
+                                check_permissions(file_of(std::string(kAccess) + "permissions"),
+                                                  authority, find_subject(*certificate)),
+                                find_expiry(issuer, *read_certificate(issuer)),
+                                find_expiry(authority, *read_certificate(authority))})};
 }
 
 }  // namespace sls::bus

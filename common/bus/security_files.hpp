@@ -9,8 +9,6 @@ struct SecurityFiles {
   bool is_secured = false;  ///< `profiles` has properties of DDS Security
   /// One line if a certificate or the permissions end within 30 days: FILE, when, what then.
   std::string expiry;
-  /// The same, also of the identities in the folders beside this one.
-  std::string expiry_of_all;
 };
 
 /// Checks the files that the DDS Security properties in `profiles` name, because Fast DDS 2.9.1

@@ -79,7 +79,7 @@ Settings load_settings(const std::filesystem::path& qos_file, int domain,
     settings.discovery_servers.push_back(rtps::IPLocator::ip_to_string(locator) + ":" +
                                          std::to_string(locator.port));
   settings.is_secured = is_secured(qos);
-  settings.expiry = bus::check_security_files(bus::read_qos_file(qos_file, identity)).expiry_of_all;
+  settings.expiry = bus::check_security_files(bus::read_qos_file(qos_file, identity)).expiry;
   return settings;
 }
 
