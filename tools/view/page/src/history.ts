@@ -12,16 +12,12 @@ interface Track {
 export class History {
   private readonly tracks = new Map<number, Track>();
   private readonly columns: Columns;
-  private readonly events: FlightEvent[] = [];
+  readonly events: FlightEvent[] = [];
   private readonly stages: { vehicle: number; sim_time_s: number; name: string }[] = [];
   private count = 0;
 
   constructor(readonly run: Run) {
     this.columns = new Columns(run.columns);
-  }
-
-  addEvent(event: FlightEvent): void {
-    this.events.push(event);
   }
 
   addStage({ stage, sim_time_s }: Status): void {
@@ -39,19 +35,13 @@ export class History {
     for (const { vehicleId, quad, attitude, load, reference, cable } of poses) {
       if (vehicleId === selected) continue;
       const row = new Float32Array(this.columns.count).fill(NaN);
-      const put = (name: string, numbers: ArrayLike<number>) => {
-        const place = this.columns.find(name);
-        if (place >= 0) row.set(numbers, place);
-      };
-      put("quad_x_m", quad);
-      put("att_w", attitude);
-      put("load_x_m", load);
-      put("ref_x_m", reference);
-      put("cable_tension_n", [cable?.tension ?? NaN]);
-      put("cable_length_m", [cable?.length ?? NaN]);
-      put("cable_taut", [Number(cable?.isTaut ?? false)]);
-      put("cable_released", [Number(cable?.isReleased ?? false)]);
-      put("load_att_w", cable?.attitude ?? []);
+      const parts: Record<string, ArrayLike<number>> = { quad_x_m: quad, att_w: attitude, load_x_m: load, ref_x_m: reference };
+      if (cable)
+        Object.assign(parts, {
+          cable_tension_n: [cable.tension], cable_length_m: [cable.length], cable_taut: [Number(cable.isTaut)],
+          cable_released: [Number(cable.isReleased)], load_att_w: cable.attitude });
+      for (const [name, numbers] of Object.entries(parts))
+        if (this.columns.find(name) >= 0) row.set(numbers, this.columns.find(name));
       this.add(vehicleId, time, row);
     }
   }

@@ -215,7 +215,7 @@ class Live {
     if (this.events.has(key)) return; // every connection sends the past events again
     this.events.add(key);
     addEvent(event);
-    this.history?.addEvent(event);
+    this.history?.events.push(event);
     this.marks = [...this.marks.slice(1 - kMostMarks), { time: event.sim_time_s, text: event.text, kind: kindOf(event.text) }];
     this.shell.plots.setMarks(this.marks);
   }
