@@ -14,6 +14,7 @@
 #include <fastdds/dds/topic/Topic.hpp>
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
 #include <sys/statvfs.h>
 #include <algorithm>
 #include <atomic>
@@ -72,7 +73,7 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   static std::filesystem::path loaded;
   const std::lock_guard lock(mutex);
   const std::string profiles = read_qos_file(file, identity);
-  const bool is_secured = check_security_files(profiles);
+  const SecurityFiles security = check_security_files(profiles);
   const auto absolute = std::filesystem::canonical(file);
   if (absolute == loaded) return;
   if (!loaded.empty())  // Fast DDS would silently keep its profiles
@@ -82,7 +83,8 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   // one that the environment names.
   setenv("SKIP_DEFAULT_XML_FILE", "1", 1);
   unsetenv(kProfilesVariable);
-  MiddlewareLog::start(is_secured);
+  if (!security.expiry.empty()) spdlog::warn("{}", security.expiry);
+  MiddlewareLog::start(security.is_secured);
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
   if (!is_ok(factory->load_XML_profiles_string(profiles.data(), profiles.size())))
@@ -190,6 +192,7 @@ struct Node::Impl {
     auto& properties = qos.properties().properties();
     properties.emplace_back(kVersionProperty, kMiddlewareVersion, true);
     if (!is_secured) return;
+    properties.emplace_back(kProcessProperty, Refusals::name_process(), true);
     use_common_algorithms(qos);
     const IdentityNames names =
         find_identity_names(find_file(qos, kCertificate), find_file(qos, kIdentityAuthority));
