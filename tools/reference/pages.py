@@ -101,6 +101,9 @@ def make_recordings_page(build):
 Every CSV file of a recording and its columns, as `recorder --columns` prints them.
 [recorder](../../recorder/README.md) says what the other files hold.
 
+Numbers read back to the same double. `pandas.read_csv` changes the last bit of half of them, unless it is called with
+`float_precision="round_trip"`.
+
 """ + columns + "\n"
 
 
