@@ -100,9 +100,7 @@ def make_recordings_page(build):
     return "# Columns of a recording\n\n" + NOTE + """
 Every CSV file of a recording and its columns, as `recorder --columns` prints them.
 [recorder](../../recorder/README.md) says what the other files hold.
-
-Numbers read back to the same double. `pandas.read_csv` changes the last bit of half of them, unless it is called with
-`float_precision="round_trip"`.
+`pandas.read_csv` changes last bits, unless it is called with `float_precision="round_trip"`.
 
 """ + columns + "\n"
 
