@@ -34,6 +34,7 @@ class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> 
   void check(const config::Scenario& scenario, const config::Places& places) const override {
     const auto& keys = scenario.plant.own.get<MultirotorKeys>();
     check_airframe(keys, places);
+    check_rod_angles(scenario.plant, places);
     check_pendulum(keys, places);
     for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id)
       check_vehicle(keys, config::make_vehicle_scenario(scenario, id).vehicle,
