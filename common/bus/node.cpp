@@ -14,6 +14,7 @@
 #include <fastdds/dds/topic/Topic.hpp>
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
 #include <sys/statvfs.h>
 #include <algorithm>
 #include <atomic>
@@ -28,6 +29,7 @@
 #include <system_error>
 #include <utility>
 
+#include "common/bus/environment.hpp"
 #include "common/bus/fastdds/data_sharing.hpp"
 #include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
@@ -72,7 +74,7 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   static std::filesystem::path loaded;
   const std::lock_guard lock(mutex);
   const std::string profiles = read_qos_file(file, identity);
-  const bool is_secured = check_security_files(profiles);
+  const SecurityFiles security = check_security_files(profiles);
   const auto absolute = std::filesystem::canonical(file);
   if (absolute == loaded) return;
   if (!loaded.empty())  // Fast DDS would silently keep its profiles
@@ -81,8 +83,9 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   // Only the file of --qos counts, not a stray file with default profiles in the working folder or
   // one that the environment names.
   setenv("SKIP_DEFAULT_XML_FILE", "1", 1);
-  unsetenv(kProfilesVariable);
-  MiddlewareLog::start(is_secured);
+  drop_foreign_variables();
+  if (!security.expiry.empty()) spdlog::warn("{}", security.expiry);
+  MiddlewareLog::start(security.is_secured);
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
   if (!is_ok(factory->load_XML_profiles_string(profiles.data(), profiles.size())))
@@ -147,6 +150,7 @@ struct Node::Impl {
     const std::uint32_t most_sent = limit_datagrams(qos);
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
+    check_environment(qos, domain);
     MiddlewareLog::clear();
     remove_stale_segments();
     expect_room(qos);
@@ -190,6 +194,7 @@ struct Node::Impl {
     auto& properties = qos.properties().properties();
     properties.emplace_back(kVersionProperty, kMiddlewareVersion, true);
     if (!is_secured) return;
+    properties.emplace_back(kProcessProperty, Refusals::name_process(), true);
     use_common_algorithms(qos);
     const IdentityNames names =
         find_identity_names(find_file(qos, kCertificate), find_file(qos, kIdentityAuthority));
@@ -241,6 +246,19 @@ struct Node::Impl {
     const auto& own = qos.transport().user_transports;
     return qos.transport().use_builtin_transports ||
            std::any_of(own.begin(), own.end(), is_shared_memory);
+  }
+
+  void check_environment(const dds::DomainParticipantQos& qos, int domain) {
+    const auto& port = qos.wire_protocol().port;
+    environment.domain = domain;
+    environment.port_base = port.portBase;
+    environment.domain_gain = port.domainIDGain;
+    environment.uses_shared_memory = has_shared_memory(qos);
+    environment.is_local = is_on_this_machine;
+    environment.most_participants = qos.allocation().participants.maximum;
+    const Environment seen = look_around(environment);
+    environment.addresses_at_start = seen.addresses;
+    if (const std::string error = find_start_error(seen); !error.empty()) throw BusError(error);
   }
 
   /// Fast DDS finds no room only when it writes, and then the process dies of SIGBUS.
@@ -330,6 +348,7 @@ struct Node::Impl {
   ParticipantPorts ports;
   DiscoveredParticipants discovered;
   PeerId self;
+  Environment environment;  // as it was given, and the addresses at the start
   std::unique_ptr<ParticipantListener> listener;
   dds::DomainParticipant* participant = nullptr;
   dds::Publisher* publisher = nullptr;
@@ -375,9 +394,13 @@ std::size_t Node::max_sample_bytes() const { return impl_->max_datagram_bytes - 
 std::string Node::describe_isolation() const {
   constexpr auto kUsualDiscoveryTime = std::chrono::seconds(3);
   const auto* participant = impl_->participant;
-  const bool is_alone = participant->get_participant_names().size() <= 1;  // the first is our own
-  if (!is_alone || std::chrono::steady_clock::now() - impl_->joined < kUsualDiscoveryTime)
-    return "";
+  if (std::chrono::steady_clock::now() - impl_->joined < kUsualDiscoveryTime) return "";
+  Environment environment = impl_->environment;
+  environment.participants = participant->get_participant_names().size();  // the first is our own
+  environment.is_alone = environment.participants <= 1;
+  environment = look_around(environment);
+  if (const std::string cause = find_cause(environment); !cause.empty()) return "; " + cause;
+  if (!environment.is_alone) return "";
   const auto& builtin = participant->get_qos().wire_protocol().builtin;
   const auto name_hosts = [](const auto& locators) {
     std::string hosts;
@@ -396,9 +419,16 @@ std::string Node::describe_isolation() const {
   if (!builtin.initialPeersList.empty())
     return domain + " at " + name_hosts(builtin.initialPeersList) +
            ": is SLS_PEERS right? (./sls doctor)";
+  const std::string elsewhere = bus::describe_other_flight(environment, true);
   return domain +
-         ": another domain or QoS file, or is multicast blocked? try config/qos/unicast.xml, "
-         "or ./sls doctor";
+         (elsewhere.empty() ? ": another domain or QoS file"
+                            : ", but " + elsewhere + ": is --domain right") +
+         ", or is multicast blocked? try config/qos/unicast.xml, or ./sls doctor";
+}
+
+std::string Node::describe_other_flight() const {
+  const std::string text = bus::describe_other_flight(look_around(impl_->environment));
+  return text.empty() ? "" : "; " + text;
 }
 
 PeerId Node::id() const { return to_peer(impl_->participant->get_instance_handle()); }

@@ -20,6 +20,7 @@ from sls.delay_formula import (HorizontalChain, Lateness, calc_error_ratio,
                                calc_stability_limit)
 from sls.figures import REFERENCE, REFERENCE_COLOUR, WIDTH_IN, colour_of, draw, make_stack, style_of
 from sls.trajectory import Trajectory, calc_roll_pitch_yaw
+from sls.errors import RunError
 from sls.input_error import InputError
 from sls.metrics import StageMetrics, calc_over, split_laps
 from sls.recordings import Recording
@@ -159,7 +160,7 @@ FLIGHTS = (*(Planned(name, name) for name, _, _ in INGREDIENTS), *(flight for fl
            *(flight for _, _, flight in STEPS))
 
 
-class RunFailed(Exception):
+class RunFailed(RunError):
     """A flight or a search for a delay margin failed; the message names it."""
 
 

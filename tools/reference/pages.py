@@ -102,6 +102,7 @@ def make_recordings_page(build):
     return "# Columns of a recording\n\n" + NOTE + """
 Every CSV file of a recording and its columns, as `recorder --columns` prints them.
 [recorder](../../recorder/README.md) says what the other files hold.
+`pandas.read_csv` changes last bits, unless it is called with `float_precision="round_trip"`.
 
 """ + columns + "\n"
 

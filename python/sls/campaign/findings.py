@@ -16,6 +16,7 @@ from sls.campaign import studies, team_studies
 from sls.campaign.run_table import read_runs
 from sls.figures import STYLE, save
 from sls.input_error import InputError
+from sls.launcher.place import say
 from sls.scenario import ROOT
 from sls.tables import fill_page
 
@@ -46,9 +47,9 @@ def main(arguments: Sequence[str]) -> int:
     parser.add_argument("--out", type=Path, default=ROOT / "docs", metavar="DIR")
     options = parser.parse_args(arguments)
     try:
-        print(f"sls: campaigns: {write_findings(options.campaigns, options.out)}", file=sys.stderr)
+        say(f"campaigns: {write_findings(options.campaigns, options.out)}")
     except InputError as error:
-        print(f"sls: error: {error}", file=sys.stderr)
+        say(f"error: {error}")
         return 2
     return 0
 

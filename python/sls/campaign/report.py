@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from sls.campaign import drawing
 from sls.campaign.drawing import OUTCOME_COLOURS, Scale, format_number, format_share, name_unit
@@ -22,6 +21,8 @@ from sls.campaign.pairs import (describe_changes, describe_interval, find_pairs,
                                 make_outcome_rows)
 from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs
 from sls.campaign.statistics import calc_medians, calc_quantiles, calc_share_interval
+from sls.campaign.yaml_nodes import parse_yaml
+from sls.input_error import InputError
 from sls.report import escape, join_page, make_fact_list, make_plain_table, make_section
 
 MOST_VALUES = 41  # a key with more values gets bins of equal width instead of one bin per value
@@ -122,11 +123,11 @@ def name_word(word: str) -> str:
     beginning."""
     if word.startswith("{"):
         try:
-            values = list(yaml.safe_load(word).values())
-        except (yaml.YAMLError, AttributeError):
-            values = []
-        if values and not isinstance(values[0], (dict, list)):
-            word = str(values[0])
+            first = next(iter(parse_yaml(word.encode(), Path()).read_map().values()), None)
+        except InputError:
+            first = None
+        if first and not (first.is_map or first.is_list):
+            word = first.node.value
     return word if len(word) <= 24 else f"{word[:23]}…"
 
 
