@@ -225,5 +225,4 @@ def load_exit_codes():
     """[(code, meaning)] of every program."""
     header = read("common/app/run_main.hpp")
     codes = re.findall(r"kExit\w+ = (\d+);\s*///< (.*)", header)
-    match = re.search(r"Interrupted: (\d+) \((\w+)\) or (\d+) \((\w+)\)", header)
-    return codes + [(match[1], f"Interrupted by {match[2]}."), (match[3], f"Interrupted by {match[4]}.")]
+    return codes + [(code, f"Interrupted by {name}.") for code, name in re.findall(r"(\d+) \((SIG\w+)\)", header)]
