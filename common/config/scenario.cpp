@@ -257,14 +257,11 @@ void check_step(Scenario& scenario, const Places& places) {
   const double step = to_seconds(scenario.plant.step_ns), angle = rate * step;
   if (angle <= kFine) return;
   const bool is_refused = angle > kMost;
-  std::string message =
-      "expected at most " + to_text(std::floor((is_refused ? kMost : kFine) / rate * 1e6) / 1e6) +
-      " for a swing of " + to_text(std::round(rate * 10.0) / 10.0) + " rad/s, got " + to_text(step);
-  const double kept = std::exp(-std::pow(angle, 5) / 72.0 * 200.0 * M_PI);
-  if (!is_refused)
-    message += ": 100 swings lose " + to_text(std::round(1000.0 * (1.0 - kept)) / 10.0) +
-               " % of their energy";
-  const ConfigError error = places.make_error_at("plant.step_s", message);
+  const double most = std::floor((is_refused ? kMost : kFine) / rate * 1e6) / 1e6;
+  const ConfigError error = places.make_error_at(
+      "plant.step_s", "expected at most " + to_text(most) + " for a swing of " +
+                          to_text(std::round(rate * 10.0) / 10.0) + " rad/s, got " + to_text(step) +
+                          (is_refused ? "" : ": the swing loses energy"));
   if (is_refused) throw error;
   scenario.warning = error.what();
 }
