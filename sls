@@ -99,13 +99,21 @@ install_missing() {
     sudo=(sudo)
   fi
   log="$(mktemp)"
-  if ! { "${sudo[@]}" apt-get update && "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y \
-    --no-install-recommends "${missing[@]}"; } >"$log" 2>&1; then
+  if ! { "${sudo[@]}" apt-get update && say_size "${missing[@]}" && "${sudo[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y \
+    --no-install-recommends "${missing[@]}"; } 3>&2 >"$log" 2>&1; then
     # apt-get update only warns where the network is missing; then packages are unknown.
     fail "apt-get: $(sed -n 's/^E: //p' "$log" | head -n 1)$(
       sed -n 's/^W: Failed to fetch /; /p' "$log" | head -n 1) (whole log: $log)"
   fi
   rm -f "$log"
+}
+
+# say_size PACKAGE…: says how much apt-get is going to fetch and to install.
+say_size() {
+  local size
+  size="$("${sudo[@]}" env LC_ALL=C apt-get --assume-no --no-install-recommends install "$@" 2>/dev/null |
+    sed -nE 's/^(Need to get|After this operation,) //p' | paste -sd ' ')" || true
+  [[ -z $size ]] || say "apt-get: $size" 2>&3
 }
 
 # has_tree FOLDER: true if it is a build tree of this checkout made with Ninja, false if none, copied or moved.
@@ -178,7 +186,8 @@ build_tree() {
   local preset=$1 folder=$2 targets=() fresh=() lock log="$2/build.log" began configured
   shift 2
   (($#)) && targets=(--target "$@")
-  mkdir -p "$folder"
+  { mkdir -p "$folder" && : >>"$folder/lock"; } 2>/dev/null ||
+    fail "$folder: expected a folder of yours to build in, got one that user $(id -un) cannot write: copy the checkout"
   exec {lock}>"$folder/lock"
   flock "$lock"  # Ninja's files do not survive two builds of one folder at once
   began=$SECONDS
@@ -229,7 +238,8 @@ expand() {
 
 is_installing=1
 [[ ${1:-} != --no-install || $# == 1 ]] || { is_installing=0; shift; }
-[[ $* != 'setup --no-install' ]] || { is_installing=0; set -- setup; }
+[[ ${1:-} == python || " $* " != *' --no-install '* ]] || is_installing=0
+[[ $* != 'setup --no-install' ]] || set -- setup
 case ${1:-} in
   setup) (($# > 1 || is_installed)) || { setup; exit; } ;;  # also without Python
   @setup) expand "${@:2}"; setup "${names[@]}"; exit ;;
@@ -240,6 +250,7 @@ case ${1:-} in
   @complete) [[ -x /usr/bin/python3 ]] || exit 0 ;;  # installs nothing
 esac
 [[ -x /usr/bin/python3 ]] || install_missing python3
+[[ -x /usr/bin/python3 ]] || fail "/usr/bin/python3: expected Debian's Python, got none: apt-get install python3"
 ((is_installing)) || set -- --no-install "$@"
 unset PYTHONHOME  # of another Python
 exec /usr/bin/python3 -BI "$root/python/sls/launcher/__main__.py" "$@"

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <system_error>
@@ -243,6 +244,30 @@ void check_attitudes(const Scenario& scenario, const Places& places) {
     }
 }
 
+/// Refuses a step that is too coarse for the fastest swing, and warns of one that damps it
+/// (sim_server/plants/README.md). A plant in a library has steps of its own.
+void check_step(Scenario& scenario, const Places& places) {
+  constexpr double kMost = 1.0, kFine = 0.25;  // angle of the swing in a step, rad
+  if (scenario.plant.model.is_shared_library()) return;
+  const auto& plant = find_model_keys(places.models().plants, scenario.plant.model);
+  double rate = 0.0;
+  for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id)
+    rate = std::max(rate, plant.calc_swing_rate(scenario, id));
+  const double step = to_seconds(scenario.plant.step_ns), angle = rate * step;
+  if (angle <= kFine) return;
+  const bool is_refused = angle > kMost;
+  std::string message =
+      "expected at most " + to_text(std::floor((is_refused ? kMost : kFine) / rate * 1e6) / 1e6) +
+      " for a swing of " + to_text(std::round(rate * 10.0) / 10.0) + " rad/s, got " + to_text(step);
+  const double kept = std::exp(-std::pow(angle, 5) / 72.0 * 200.0 * M_PI);
+  if (!is_refused)
+    message += ": 100 swings lose " + to_text(std::round(1000.0 * (1.0 - kept)) / 10.0) +
+               " % of their energy";
+  const ConfigError error = places.make_error_at("plant.step_s", message);
+  if (is_refused) throw error;
+  scenario.warning = error.what();
+}
+
 /// Conditions on cable and load need a plant that has cables, and those on the ground a ground.
 void check_conditions(const Scenario& scenario, const Places& places) {
   const auto& load = scenario.shared_load;
@@ -335,6 +360,7 @@ Scenario read_scenario(const YamlNode& root, const std::string& place, const std
   const auto& plant = find_model_keys(places.models().plants, scenario.plant.model);
   plant.check(scenario, places);
   scenario.shared_load = plant.calc_shared_load(scenario);
+  check_step(scenario, places);
   check_attitudes(scenario, places);
   check_conditions(scenario, places);
   find_model_keys(places.models().laws, scenario.controller.law).check(scenario, places);

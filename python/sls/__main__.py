@@ -8,20 +8,19 @@ import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-if __name__ == "__main__":  # before the imports, which take most of the time
+if __name__ == "__main__":  # before the other imports
     signal.signal(signal.SIGINT, lambda *_: (os.write(2, b"sls: interrupted\n"), os._exit(130)))
 
-from sls import study
 from sls.campaign.arguments import Parser
 from sls.errors import ConfigError, RunError
-from sls.figures import PAPER, STYLE, make_figures, save
-from sls.trajectory import Trajectory
 from sls.input_error import InputError
-from sls.launcher.place import say
-from sls.published_logs import FORMATS, load_log
-from sls.recordings import Recording
-from sls.report import make_report
+from sls.launcher.place import PACKAGE, say
+
+if TYPE_CHECKING:  # numpy and matplotlib are loaded once the arguments are judged
+    from sls.recordings import Recording
+    from sls.trajectory import Trajectory
 
 
 def make_folder(folder: Path) -> None:
@@ -31,7 +30,7 @@ def make_folder(folder: Path) -> None:
         raise InputError(f"--out {folder}: expected a folder, got: {error.strerror}") from None
 
 
-def load_recording(recording: Recording, name: str | None, vehicle_id: int) -> Trajectory:
+def load_recording(recording: "Recording", name: str | None, vehicle_id: int) -> "Trajectory":
     """Loads the flight of one vehicle, and prints the notes on it, such as missing samples."""
     flight = recording.load_flight(vehicle_id, name or recording.folder.resolve().name)
     for note in flight.notes:
@@ -40,6 +39,9 @@ def load_recording(recording: Recording, name: str | None, vehicle_id: int) -> T
 
 
 def plot(options: argparse.Namespace) -> None:
+    from sls.figures import PAPER, STYLE, make_figures, save
+    from sls.published_logs import load_log
+    from sls.recordings import Recording
     names = options.name or [None] * len(options.source)
     if len(names) != len(options.source):
         raise InputError(f"--name: expected {len(options.source)} names, one for each source, "
@@ -53,7 +55,7 @@ def plot(options: argparse.Namespace) -> None:
         recording = Recording(source)
         flights.append(load_recording(recording, name, options.vehicle))
         if len(names) == 1:
-            fleet = recording.load_fleet()
+            fleet = recording.load_fleet() if len(recording.vehicle_ids) > 1 else []
             out = options.out or source / "figures"
     figures = make_figures(flights, fleet, options.paper, dict(options.panels) if options.panels else None)
     if not figures:
@@ -85,18 +87,23 @@ def read_paper(text: str) -> float:
 
 
 def report(options: argparse.Namespace) -> None:
+    if not options.recording.is_dir():
+        raise InputError(f"{options.recording}: expected a recording, got no such folder")
+    from sls.recordings import Recording
+    from sls.report import make_report
     page = make_report(Recording(options.recording), options.vehicle)
     file = options.recording / "report.html"
     if file.exists() and not file.is_file():  # a pipe would wait for a reader
         raise InputError(f"{file}: expected a file or none, got another kind")
     try:
-        file.write_text(page)
+        file.write_text(page, encoding="utf-8", errors="replace")
     except OSError as error:
         raise InputError(f"{file}: expected to write it, got: {error.strerror}") from None
     say(f"report: {file}")
 
 
 def run_study(options: argparse.Namespace) -> None:
+    from sls import study
     make_folder(options.out)
     if not options.reuse:
         study.fly_all(options.recordings, say)
@@ -123,7 +130,7 @@ def make_parser() -> argparse.ArgumentParser:
     plotting.add_argument("--name", nargs="+", help="name of each source in the figures "
                                                     "(default: its folder or file)")
     add_vehicle(plotting)
-    plotting.add_argument("--format", choices=FORMATS,
+    plotting.add_argument("--format", choices=("matlab-setpoint", "matlab-trajectory", "gazebo", "px4"),
                           help="format of the published logs (default: detected from their columns)")
     plotting.add_argument("--rod-length-m", type=float, metavar="L",
                           help="rod length for published logs without the load's position "
@@ -143,7 +150,7 @@ def make_parser() -> argparse.ArgumentParser:
 
     studying = commands.add_parser("study", description="Flies the published comparison; writes docs/study.md and its "
                                                     "pictures.")
-    studying.add_argument("--out", type=Path, default=study.ROOT / "docs", metavar="DIR",
+    studying.add_argument("--out", type=Path, default=PACKAGE.parents[1] / "docs", metavar="DIR",
                           help="folder for study.md and its pictures (default: docs)")
     studying.add_argument("--recordings", type=Path, default=Path("recordings/study"),
                           metavar="DIR", help="folder for the recordings (default: recordings/study)")
@@ -164,7 +171,7 @@ def main(arguments: Sequence[str]) -> int:
     except (ConfigError, ImportError) as error:
         say(f"error: {error}")
         return 2
-    except (RunError, study.RunFailed) as error:
+    except RunError as error:
         say(f"error: {error}")
         return 1
     return 0

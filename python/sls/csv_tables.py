@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from sls.core import load_core
+from sls.core import load_core, to_core
 from sls.errors import ConfigError
 from sls.input_error import InputError
 from sls.strict_files import open_regular, read_limited
@@ -87,16 +87,21 @@ def is_number(text: str) -> bool:
     return True
 
 
-def read_table(path: Path, required: Sequence[str]) -> tuple[dict[str, np.ndarray], bool]:
-    """The columns of a CSV file with a header, and whether its last row was cut off. Numbers are float64, those of
-    INTEGER_COLUMNS int64. The header must have the columns `required`. Raises InputError."""
+def read_header(path: Path) -> tuple[str, bool]:
+    """The first line of a file, and whether its last line was cut off. Raises InputError."""
     try:
         with open_regular(path) as file:
             header = file.readline(MOST_LINE).decode(errors="replace")
             file.seek(-1 if header else 0, os.SEEK_END)
-            is_cut = file.read() not in (b"\n", b"")
+            return header, file.read() not in (b"\n", b"")
     except OSError as error:
         raise InputError(f"{path}: expected a file, got: {error.strerror}") from None
+
+
+def read_table(path: Path, required: Sequence[str], wanted: str = ".*") -> dict[str, np.ndarray]:
+    """The columns of a CSV file with a header whose names match `wanted`. Numbers are float64, those of INTEGER_COLUMNS
+    int64. The header must have the columns `required`. Raises InputError."""
+    header, _ = read_header(path)
     if not header.endswith("\n"):
         raise InputError(f"{path}:1: expected a header, got an empty file")
     names = header[:-1].split(",")
@@ -104,13 +109,15 @@ def read_table(path: Path, required: Sequence[str]) -> tuple[dict[str, np.ndarra
         if name not in names:
             raise InputError(f"{path}:1: expected a column '{name}', got '{header[:60].rstrip()}'")
     try:
-        columns = load_core().read_table(str(path), header[:-1], TEXT_COLUMNS)
+        read = {name for name in names if re.fullmatch(wanted, name)}
+        columns = load_core().read_table(to_core(path), header[:-1], TEXT_COLUMNS, read)
     except ConfigError as error:
         raise InputError(str(error)) from None
-    for name, column in zip(names, columns):
+    table = {name: column for name, column in zip(names, columns) if name in read}
+    for name, column in table.items():
         if name in INTEGER_COLUMNS and not np.all(is_whole := (np.abs(column) < 2**53) & (column % 1 == 0)):
             raise InputError(f"{path}: {name}: expected whole numbers, got {column[np.argmin(is_whole)]:g}")
-    return {name: to_array(name, column) for name, column in zip(names, columns)}, is_cut
+    return {name: to_array(name, column) for name, column in table.items()}
 
 
 def to_array(name: str, column: Any) -> np.ndarray:

@@ -123,7 +123,7 @@ class FlownVehicle(VehicleColumns):
             time_s=self.time_s, p_WQ=self.quad_position, p_WL=self.load_position,
             p_WL_ref=self.reference_position, alpha=self.alpha, beta=self.beta,
             f_Q_W=self.force, stages=self._find_stages(), period_s=self.scenario.period_s,
-            body=read_body(self.state),
+            body=read_body(Columns({name: self.state[name] for name in self.state})),
             cable=read_cable(self.state, lambda: read_keys(self.scenario), self.vehicle_id))
 
     def _find_stages(self) -> tuple[Stage, ...]:

@@ -1,12 +1,11 @@
 """Errors in the user's input."""
 
-import re
-
 from sls.errors import ConfigError
+from sls.launcher.place import escape_controls
 
 
 class InputError(ConfigError):
-    """An error with one line: place, expected value and found value. Control characters are escaped."""
+    """An error with one line: place, expected value and found value. Controls are escaped."""
 
-    def __init__(self, text: str):
-        super().__init__(re.sub("[\x00-\x1f\x7f-\x9f\ud800-\udfff]", lambda found: f"\\x{ord(found[0]):02x}", text))
+    def __init__(self, text: object) -> None:
+        super().__init__(escape_controls(text))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from sls.campaign.yaml_nodes import parse_yaml
-from sls.core import load_core
+from sls.core import load_core, to_core
 from sls.errors import ConfigError
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def load_scenario(path_or_name: str | os.PathLike[str], *,
             replaced[path] = to_yaml_value(value)
         except (TypeError, ValueError) as error:
             raise ConfigError(f"{path_or_name}: {path}: {error}") from None
-    return load_core().Scenario(file=str(find_scenario(path_or_name)), changes=replaced)
+    return load_core().Scenario(file=to_core(find_scenario(path_or_name)), changes=replaced)
 
 
 def read_keys(scenario: "Scenario") -> dict[str, Any]:
@@ -77,7 +77,7 @@ def to_yaml_value(value: object) -> str:
         # Readers of YAML 1.1, such as Python's, read 1e-07 as text and 1.0e-07 as a number.
         return text if "." in text or "e" not in text else text.replace("e", ".0e")
     if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)  # JSON is valid YAML
+        return json.dumps(value, ensure_ascii=False).encode().decode()  # JSON is valid YAML
     if isinstance(value, Mapping):
         # Readers of YAML 1.1 read a plain `on` as true.
         keys = [key if str(key).isidentifier() and key not in ("on", "off", "yes", "no") else

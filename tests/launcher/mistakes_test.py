@@ -4,6 +4,7 @@ The launcher runs in a small checkout. Stand-ins for what sets up and builds rec
 
 import contextlib
 import io
+import itertools
 import json
 import os
 import pathlib
@@ -12,6 +13,7 @@ import re
 import signal
 import socket
 import subprocess
+import sys
 import tempfile
 import time
 import unittest
@@ -58,6 +60,8 @@ MISTAKES = {
     "discovery-server --port 0": "--port: expected 1 to 65535, got '0' (see ./sls discovery-server --help)",
     "test --sanitize addr": "--sanitize: expected address or thread, got 'addr' (see ./sls test --help)",
     "build everything": "build: expected no argument, got 'everything' (see ./sls build --help)",
+    "report many": "many: expected a recording, got a folder of 1; the newest: many/a",
+    "verify a many": "many: expected a recording, got a folder of 1; the newest: many/a",
     "fuzz --target cvs": "--target: expected scenario, faults, qos_file, csv, recording, samples, foxglove or web, got 'cvs' (see ./sls fuzz "
                          "--help)",
 }
@@ -65,12 +69,13 @@ MISTAKES = {
 
 class MistakesTest(checkout.CheckoutTest):
     maxDiff = None
-    parts = ("config", "docs/reference")
+    parts = ("config", "docs/reference", "python/sls/check", "python/sls/errors.py")
 
     def setUp(self):
         super().setUp()
         for name in ("cmake", "ninja", "dpkg-query", "apt-get", "node", "npm"):
             self.stand_in(name, "exit 1")
+        self.write("many/a/manifest.json", "{}")
 
     def launch(self, *words, **variables):
         return subprocess.run([self.root / "sls", *words], cwd=self.folder, env={**self.environment, **variables},
@@ -90,11 +95,19 @@ class MistakesTest(checkout.CheckoutTest):
     def test_a_bad_variable_is_named(self):
         self.expect_refused("SLS_DOMAIN: expected 0 to 232, got 'abc'", "run", "short", SLS_DOMAIN="abc")
 
+    def test_a_folder_without_a_place_for_recordings_is_refused_with_the_option(self):
+        self.write("recordings", "a file")
+        self.expect_refused("recordings: expected a folder to write in, got none here (--out DIR names another)", "run", "short")
+
     def test_a_build_without_programs_is_named(self):
         done = subprocess.run([self.root / "sls", "run", "short"], env={**os.environ, "SLS_BUILD": str(self.folder)},
                               capture_output=True, text=True, timeout=60, check=False)
         self.assertEqual((done.returncode, done.stderr),
                          (1, f"sls: error: {self.folder}/bin/sim_server: expected a program, got no such file\n"))
+
+    def test_a_check_whose_programs_cannot_be_built_is_unusable(self):
+        self.assertEqual(self.launch("check", "short", "--junit", "junit.xml").returncode, 2)
+        self.assertIn('errors="1"', (self.folder / "junit.xml").read_text())
 
     def test_a_used_port_is_refused_before_the_flight(self):
         with socket.socket() as other:
@@ -130,16 +143,37 @@ class AnswersTest(unittest.TestCase):
         self.assertEqual(launch("--version").stdout, f"sls {version}\n")
         self.assertEqual(__version__, version)
 
-    def test_the_list_has_every_name_and_fits_the_terminal(self):
+    def test_the_list_has_every_name_and_fits_the_terminal_but_is_whole_in_a_pipe(self):
+        shown = subprocess.run(["script", "-qc", f"stty cols 80; {ROOT}/sls list", "/dev/null"], capture_output=True, text=True).stdout
+        self.assertEqual([line for line in shown.splitlines() if len(line) > 80], [])
         said = launch("list").stdout
+        self.assertNotIn("…", said)
         names = set(re.findall(r"^  (\S+) {2,}\S", said, re.MULTILINE))
         for file, kind in (("control_client/laws/laws.def", "LAW"), ("sim_server/plants/plants.def", "PLANT")):
             own = set(re.findall(rf"^SLS_{kind}\((\w+)\)", (ROOT / file).read_text(), re.MULTILINE))
             self.assertEqual(own - names, set())
         self.assertEqual({*list_names("scenarios"), *list_names("campaigns")} - names, set())
-        self.assertEqual([line for line in said.splitlines() if len(line) > 80], [])
         self.assertEqual(len(names), sum(map(len, (list_names("scenarios"), list_names("campaigns"), listing.LAWS,
                                                    listing.PLANTS))) - 1)
+
+    def test_every_encoding_and_a_reader_that_has_gone_are_no_error(self):
+        ours, theirs = os.pipe()
+        os.close(ours)
+        for command, encoding, out in itertools.product(("help", "list"), ("ascii", "latin-1", "utf-8"),
+                                                        (subprocess.PIPE, theirs)):
+            with self.subTest(command, encoding=encoding):
+                done = subprocess.run([sys.executable, "-B", ROOT / "python/sls/launcher/__main__.py", command], stdout=out,
+                                      stderr=subprocess.PIPE, env={**os.environ, "PYTHONIOENCODING": encoding}, check=False)
+                self.assertEqual((done.returncode, done.stderr), (0, b""))
+        os.close(theirs)
+
+    def test_two_flights_that_differ_because_of_their_scenarios_are_named_so(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for name in ("short", "mission"):
+                launch("run", name, "--in-process", "--out", name, cwd=folder)
+            done = launch("verify", "short", "mission", cwd=folder, code=1)
+        self.assertEqual(done.stderr, "sls_verify: error: A and B are flights of different scenarios\n")
+        self.assertNotIn("largest difference", done.stdout)
 
     def test_the_summary_for_machines_is_one_line_of_json(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -82,6 +82,22 @@ class SetupTest(CheckoutTest):
                 self.assertEqual((code, said), (0, ""))
                 self.assertNotIn("apt-get", calls)
 
+    def test_the_size_of_what_is_installed_is_said_before(self):
+        self.stand_in("apt-get", "echo 'Need to get 9 kB of archives.'; echo 'After this operation, 5 MB of disk space will be used.'")
+        code, said, _ = self.launch(BOOKWORM, "setup")
+        self.assertEqual((code, said.splitlines()[1:]), (
+            0, ["sls: apt-get: 9 kB of archives. 5 MB of disk space will be used."]))
+
+    def test_a_machine_without_python_and_a_folder_that_cannot_be_written_are_one_line(self):
+        text = (self.root / "sls").read_text()
+        (self.root / "build/lock").mkdir(parents=True)
+        code, said, _ = self.launch(BOOKWORM, "build", "--no-install")
+        self.assertRegex(said, f"^sls: error: {self.root}/build: expected a folder of yours to build in, got one .*\n$")
+        (self.root / "sls").write_text(text.replace("/usr/bin/python3", "/usr/bin/no-python"))
+        for words in (("demo", "--no-install"), ("--no-install", "demo")):
+            self.assertEqual(self.launch(BOOKWORM, *words), (
+                1, "sls: error: /usr/bin/no-python: expected Debian's Python, got none: apt-get install python3\n", ""))
+
     def test_a_missing_network_is_one_line_with_the_reason(self):
         self.said.write_text(OFFLINE)
         code, said, _ = self.launch(BOOKWORM, "setup")

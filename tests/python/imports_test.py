@@ -4,7 +4,7 @@ count, too: they hide a circle, but do not untie it."""
 import ast
 from graphlib import TopologicalSorter
 
-from places import ROOT
+from places import ROOT, run_python
 
 PACKAGE = ROOT / "python"
 
@@ -33,3 +33,9 @@ def test_the_package_has_no_circle():
     modules = list_modules()
     assert "sls.campaign.folder" in modules
     TopologicalSorter({name: find_imports(name, file, modules) for name, file in modules.items()}).prepare()
+
+
+def test_a_report_judges_its_arguments_before_it_loads_numpy():
+    done = run_python("import sys\nfrom sls.__main__ import main\n"
+                      "print(main(['report', 'none']), main(['report', '.', '--vehicle', 'x']), 'numpy' in sys.modules)")
+    assert done.stdout == "2 2 False\n", done.stderr

@@ -9,6 +9,7 @@ namespace {
 
 constexpr double kShortestTimeout = 0.1;  // s
 constexpr double kLongestTimeout = 86400;
+constexpr double kTimeoutOfOneLook = 3;  // discovery takes less, if no packet is lost
 
 std::string check_timeout(const std::string& text) {
   double timeout_s = 0.0;
@@ -31,10 +32,10 @@ std::string check_steps(const std::string& text) {
 void add_options(CLI::App& cli, Options& options) {
   app::add_common_options(cli, options.common);
   cli.add_option("--vehicle", options.vehicle_id, "control the run of vehicle N")->type_name("N");
-  cli.add_option("--timeout-s", options.timeout_s,
-                 "time limit for finding a server, and for its reply, s")
-      ->type_name("X")
-      ->check(check_timeout);
+  auto* timeout = cli.add_option("--timeout-s", options.timeout_s,
+                                 "time limit for finding a server, and for its reply, s "
+                                 "(status without --watch: 3)");
+  timeout->type_name("X")->check(check_timeout);
   cli.require_subcommand(0, 1);  // with 1 the error would not name the unknown command
   cli.callback([&cli] {
     if (cli.get_subcommands().empty())
@@ -62,6 +63,9 @@ void add_options(CLI::App& cli, Options& options) {
   auto* status = cli.add_subcommand("status", "print the status of the run");
   status->add_flag("--watch", options.watch, "repeat until the run has ended");
   status->add_flag("--json", options.json, "print one JSON object per line");
+  status->callback([&options, timeout] {
+    if (timeout->empty() && !options.watch) options.timeout_s = kTimeoutOfOneLook;
+  });
 }
 
 }  // namespace sls::ctl

@@ -56,7 +56,8 @@ void add_options(CLI::App& cli, Options& options) {
                  "address to listen on; addresses other than loopback need --token-file")
       ->type_name("ADDRESS");
   cli.add_option("--port", options.server.port, "port to listen on; 0: any free port")
-      ->type_name("N");
+      ->type_name("N")
+      ->check(CLI::Range(0, 65535));
   cli.add_option("--token-file", options.token_file,
                  "file whose first line is the token that enables a page's buttons")
       ->type_name("FILE");

@@ -204,7 +204,7 @@ class CampaignFolder:
             for folder in (self.folder, self.folder / "chunks"):
                 folder.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise InputError(f"{self.folder}: expected a folder to write in, got: "
+            raise InputError(f"{self.folder}: expected a folder to write in (--out DIR names one), got: "
                              f"{error.strerror}") from None
 
     def remove_leftovers(self) -> None:

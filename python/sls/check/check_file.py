@@ -126,6 +126,8 @@ def find_checks(name: str) -> list[Path]:
 def load_check(file: Path, library: Path | None = None) -> Check:
     """With `library` in place of the controller. Raises ConfigError: one line with file, line, key, expected and got."""
     root = parse_yaml(read_bytes(file, "a check file", MOST_BYTES), file)
+    if root.is_map and any(key.value == "mission" for key, _ in root.node.value):
+        root.fail("expected a check, which names a scenario and what to expect of it, got a scenario: ./sls run flies it")
     known = ("scenario", "expect", "participants", "placements", "under", "limit_s")
     values = root.read_map("a check: scenario, expect …", known)
     place = root.require(values, "scenario", "a name in config/scenarios, or a path")

@@ -17,10 +17,10 @@ from sls.check.difference import find_difference
 from sls.check.faults import PLACEMENTS, WORDS, Fault, check_able, parse_fault
 from sls.check.flights import fly
 from sls.check.judge import judge, open_recording
-from sls.check.results import HELD, Result, find_code, make_rows, write_json, write_junit
+from sls.check.results import HELD, Result, count_verdicts, describe, find_code, make_rows, write_files
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
-from sls.launcher.place import say
+from sls.launcher.place import find_width, printing, say, show
 
 MOST_LOG_LINES = 30
 MEANING = "Flies the scenario of each check file and judges its recording."
@@ -88,13 +88,12 @@ def fly_and_judge(job: Job) -> Result:
             try:
                 recording = open_recording(job.check, flown.recording)
             except InputError as error:  # it has gaps
+                result.is_unusable |= not result.problem
                 result.problem = result.problem or str(error)
             else:
                 result.judged, result.certificate = judge(job.check, recording), recording.certificate
-    except (ConfigError, ImportError) as error:
-        result.problem, result.is_unusable = str(error), True
-    except (RunError, OSError) as error:
-        result.problem = str(error)
+    except Exception as error:  # one of many flights: no verdict on it
+        result.problem, result.is_unusable = describe(error), True
     return result
 
 
@@ -238,17 +237,14 @@ def print_results(results: Sequence[Result]) -> None:
         return
     shown = {(one.check, one.placement, *one.list_problems()): one for one in reversed(results) if one.placement}
     shown = list(reversed(shown.values()))
-    for line in make_rows(shown):
-        print(line)
+    for line in make_rows(shown, find_width()):
+        show(line)
     for one in shown:
         for problem in one.list_problems():
-            print(f"{one.name}: {problem}")
-    verdicts = [one.verdict for one in results]
-    words = ", ".join(f"{verdicts.count(word)} {word}" for word in dict.fromkeys((HELD, *sorted(verdicts)))
-                      if verdicts.count(word))
+            show(f"{one.name}: {problem}")
     flown = [(one.check, one.certificate) for one in results if one.certificate]
     are_same = len(set(flown)) == len({check for check, _ in flown}) < len(flown)
-    print(f"{len(results)} flight{'s' if len(results) > 1 else ''}: {words}"
+    print(count_verdicts(results)
           + ("; the flights of each check have equal bytes" if are_same else ""))
 
 
@@ -256,41 +252,25 @@ def main(arguments: Sequence[str]) -> int:
     """Runs the command and returns the exit code. Whatever happens, --junit and --json are written."""
     catch_end_signals()
     results = list[Result]()
-    given = {name: Path(word) for name in ("junit", "json")
-             if (word := find_option(arguments, f"--{name}"))}
-    folder = Path(tempfile.mkdtemp(prefix="sls-check-"))
-    code = 0
+    folder, code = "", 0
     try:
+        folder = tempfile.mkdtemp(prefix="sls-check-")
         options = make_parser().parse_args(arguments)
         if options.report:
             options.report.mkdir(parents=True, exist_ok=True)
-        check_all(options, folder, results)
-        print_results(results)
-    except (ConfigError, OSError, RuntimeError) as error:  # a worker that was killed, for example
-        say(f"error: {error}")
-        results.append(Result("sls check", "", problem=str(error), is_unusable=True))
+        check_all(options, Path(folder), results)
+        with printing():
+            print_results(results)
     except Ended:
         code = 143
     except KeyboardInterrupt:
         code = 130
+    except Exception as error:  # a worker that was killed, for example
+        say(f"error: {describe(error)}")
+        results.append(Result("sls check", "", problem=describe(error), is_unusable=True))
     finally:
         shutil.rmtree(folder, ignore_errors=True)
     if code:
         results.append(Result("sls check", "", problem="interrupted", is_unusable=True))
-    try:
-        for name, file in given.items():
-            {"junit": write_junit, "json": write_json}[name](file, results)
-    except OSError as error:
-        say(f"error: {error.filename}: expected to write it, got: {error.strerror}")
-        code = code or 2
-    return code or find_code(results)
-
-
-def find_option(arguments: Sequence[str], name: str) -> str:
-    """The value of an option also where the command line cannot be read."""
-    for number, word in enumerate(arguments):
-        if word.startswith(f"{name}="):
-            return word.partition("=")[2]
-        if word == name and number + 1 < len(arguments):
-            return arguments[number + 1]
-    return ""
+    failed = write_files(arguments, results)
+    return code or failed or find_code(results)

@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from sls.check.faults import Fault, check_able
 from sls.check.hosts import Hosts
 from sls.check.python_law import STEPS
 from sls.dds_domain import own_domain
-from sls.launcher.place import BUILD, ROOT
+from sls.launcher.place import BUILD, ROOT, STRAY_VARIABLES
 from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor
 
 PROFILES = {"shm": "default", "udp": "udp", "hosts": "lan"}
@@ -168,7 +169,7 @@ class Programs:
         is_own = name in CONTROLLERS and self._own
         if is_own and self._is_command:
             more = {"cwd": self._own.folder, "process_group": 0}
-        env = dict(os.environ)
+        env = {name: value for name, value in os.environ.items() if name not in STRAY_VARIABLES}
         if not self._hosts:
             env.setdefault("CYCLONEDDS_URI", LOOPBACK)
         if is_own:
@@ -271,7 +272,8 @@ class Programs:
         """Names the program that failed, if the recording alone does not say it."""
         codes = {name: code for name, code in self._programs.codes.items() if name not in self._programs.expendable}
         self._flown.is_unusable = self._is_engine_failure(codes.get("controller", 0)) or any(
-            code == 2 and not (self._is_command and name in CONTROLLERS) for name, code in codes.items())
+            code == -signal.SIGBUS or code == 2 and not (self._is_command and name in CONTROLLERS)
+            for name, code in codes.items())
         manifest = self._flown.read_manifest()
         outcome, reason = manifest.get("outcome"), str(manifest.get("reason"))
         if not self._flown.problem:
@@ -280,6 +282,8 @@ class Programs:
             self._flown.problem = (f"--under {self._waiting[0]}: expected a flight of more than 0.3 s, got one that "
                                    "was over before the fault began")
         self._flown.is_whole = outcome == "finished" or outcome == "failed" and not self._flown.problem
+        if not self._flown.is_whole and (obstacle := find_obstacle(self._flown.folder, self._flyer == "sim_server")):
+            self._flown.problem, self._flown.is_unusable = obstacle, True
 
     def _find_late_end(self, codes: dict[str, int]) -> str:
         """A process under test that was asked to stop after the flight, and did not."""
@@ -302,8 +306,16 @@ class Programs:
         else:
             blamed = next((name for name, code in codes.items() if code or name in CONTROLLERS), "sim_server")
         code = codes.get(blamed, 0)
+        self._flown.is_unusable |= bool(blamed) and self._is_ours(blamed, code, outcome)
         return blamed and (f"{blamed}: {describe_code(code)} {step}, before the flight was over"
                            f"{self._quote(blamed, code)}")
+
+    def _is_ours(self, blamed: str, code: int, outcome: str | None) -> bool:
+        """Whether the end of this program says nothing about the controller: one without a law in it, or one of ours
+        that ended before the recorder heard of the run."""
+        if blamed in CONTROLLERS:
+            return code in (1, 126, 127) and outcome is None and self._flyer == "sim_server" and not self._is_command
+        return blamed != "closed_loop" or code > 0 or not self._check.scenario.law.endswith(".so")
 
     def _read_log(self, name: str) -> str:
         try:
@@ -320,6 +332,17 @@ class Programs:
     def _quote(self, name: str, code: int) -> str:
         line = self._read_line(name, 0 if self._is_engine_failure(code) else -1)
         return f": {line}" if line else ", without a word"
+
+
+def find_obstacle(folder: Path, uses_shared_memory: bool) -> str:
+    """Why no flight can be recorded here, or no program can start; else empty."""
+    for place in (folder, Path("/dev/shm"))[:1 + uses_shared_memory]:
+        try:
+            with tempfile.TemporaryFile(dir=place, buffering=0) as file:
+                os.posix_fallocate(file.fileno(), 0, 2**20)
+        except OSError as error:
+            return f"{place}: expected room for a flight, got: {error.strerror}"
+    return ""
 
 
 def describe_code(code: int) -> str:
@@ -361,5 +384,6 @@ def fly_worlds(check: Check, flown: Flown, scenario: Path, faults: tuple[Fault, 
     if found or len(rows) != WORLDS:
         at = log.index(found[0]) if found else -2
         flown.problem = f"worlds: {' '.join(log[at:at + 2]) if log else 'ended without a word'}"
+        flown.is_unusable |= not found
     elif unfinished:
         flown.problem = f"worlds: expected finished flights, got none in the world of seed {unfinished[0]}"

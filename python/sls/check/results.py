@@ -7,9 +7,13 @@ import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from sls.check.judge import Judged
+from sls.errors import ConfigError, RunError
+from sls.launcher.place import say
+
+if TYPE_CHECKING:  # it needs numpy, which may be missing
+    from sls.check.judge import Judged
 
 HELD, NOT_HELD, UNUSABLE = "held", "not held", "unusable"
 CODES = {HELD: 0, NOT_HELD: 1, UNUSABLE: 2}
@@ -25,7 +29,7 @@ class Result:
     under: str = ""
     repeat: int = 1
     repeats: int = 1
-    judged: list[Judged] = field(default_factory=list)
+    judged: "list[Judged]" = field(default_factory=list)
     problem: str = ""  # of the whole flight, in one line
     is_unusable: bool = False
     difference: str = ""  # from another flight of the check that should have equal bytes
@@ -67,6 +71,13 @@ class Result:
                 "expectations": [to_finite(asdict(one)) for one in self.judged]}
 
 
+def count_verdicts(results: Sequence[Result]) -> str:
+    """`3 flights: 2 held, 1 not held`."""
+    verdicts = [one.verdict for one in results]
+    words = ", ".join(f"{verdicts.count(word)} {word}" for word in CODES if word in verdicts)
+    return f"{len(results)} flight{'s' if len(results) != 1 else ''}: {words}"
+
+
 def find_code(results: Sequence[Result]) -> int:
     return max((CODES[result.verdict] for result in results), default=0)
 
@@ -103,11 +114,12 @@ def make_suite(check: str, results: Sequence[Result]) -> str:
         if one.verdict != HELD:
             lines = one.list_problems()
             kind = "failure" if one.verdict == NOT_HELD else "error"
-            inner = f"<{kind} message={quote(lines[0])}>{clean(lines)}</{kind}>" if lines else ""
+            place = f"{one.file}: " if kind == "failure" else ""  # an error names its own
+            inner = f"<{kind} message={quote(place + lines[0])}>{clean(lines)}</{kind}>" if lines else ""
             inner += f"<system-out>{clean(make_rows([one]))}</system-out>" if one.judged else ""
             logs = [f"{name}: {line}" for name, text in one.logs.items() for line in text.splitlines()]
             inner += f"<system-err>{clean(logs)}</system-err>" if logs else ""
-        cases += (f"  <testcase classname={quote(check)} name={quote(one.flight or 'file')} file={quote(one.file)} "
+        cases += (f"  <testcase classname={quote(check)} name={quote(one.flight or 'file')} "
                   f"time=\"{one.wall_s:.3f}\">{inner}</testcase>\n")
     return f" <testsuite name={quote(check)} {count(results)}>\n{cases}</testsuite>\n"
 
@@ -127,7 +139,43 @@ def quote(text: str) -> str:
 def write(file: Path, text: str) -> None:
     """Raises OSError."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(text, encoding="utf-8")
+    file.write_text(text, encoding="utf-8", errors="backslashreplace")
+
+
+def write_files(arguments: Sequence[str], results: Sequence[Result]) -> int:
+    """Writes what --junit and --json name, also where the command line cannot be read. Returns 2 if it cannot."""
+    code = 0
+    for name, write_results in (("--junit", write_junit), ("--json", write_json)):
+        if file := find_option(arguments, name):
+            try:
+                write_results(Path(file), results)
+            except OSError as error:
+                say(f"error: {error.filename or file}: expected to write it, got: {error.strerror}")
+                code = 2
+    return code
+
+
+def find_option(arguments: Sequence[str], name: str) -> str:
+    for number, word in enumerate(arguments):
+        if word.startswith(f"{name}="):
+            return word.partition("=")[2]
+        if word == name and number + 1 < len(arguments):
+            return arguments[number + 1]
+    return ""
+
+
+def refuse(arguments: Sequence[str], problem: str) -> int:
+    """Says and writes that nothing was judged; returns the exit code."""
+    say(f"error: {problem}")
+    write_files(arguments, [Result("sls check", "", problem=problem, is_unusable=True)])
+    return 2
+
+
+def describe(error: Exception) -> str:
+    """One line. Errors that nobody expected have their class before it."""
+    text = " ".join(str(error).split())
+    return text if text and isinstance(error, (ConfigError, RunError, ImportError, OSError)) else (
+        f"{type(error).__name__}: {text[:300]}")
 
 
 # --- for people -----------------------------------------------------------------------------------
@@ -135,21 +183,24 @@ def write(file: Path, text: str) -> None:
 HEAD = ("check", "placement", "expectation", "value", "bound", "margin", "worst at", "verdict")
 
 
-def make_rows(results: Sequence[Result]) -> list[str]:
-    """A line for each expectation, in columns. A flight that could not be judged has one line."""
+def make_rows(results: Sequence[Result], width: int = 10**6) -> list[str]:
+    """A line of at most `width` letters for each expectation, in columns. A flight that could not be judged has one
+    line. The widest columns are shortened first."""
     rows = [list(HEAD)]
     for result in results:
         for one in result.judged:
             value = one.got if one.problem or isinstance(one.value, str) else f"{one.value:.4g} {one.unit}".rstrip()
             margin = "" if one.margin is None else f"{one.margin:.3g}"
-            rows.append([result.check, result.flight, shorten(one.text, 60), shorten(value), one.bound, margin, one.where,
+            rows.append([result.check, result.flight, one.text, value, one.bound, margin, one.where,
                          HELD if one.is_held else "NOT HELD"])
         if result.problem or result.difference:
             text = shorten(result.problem or result.difference)
             verdict = "NOT HELD" if result.verdict == NOT_HELD else result.verdict
             rows.append([result.check, result.flight, "(flight)", text, "", "", "", verdict])
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths)).rstrip() for row in rows]
+    while sum(widths) + 2 * (len(widths) - 1) > width and max(widths) > len("expect…"):
+        widths[widths.index(max(widths))] -= 1
+    return ["  ".join(shorten(cell, most).ljust(most) for cell, most in zip(row, widths)).rstrip() for row in rows]
 
 
 def shorten(text: str, most: int = 40) -> str:

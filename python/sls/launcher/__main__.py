@@ -8,7 +8,11 @@ def start() -> int:
     """Runs the command of the command line; returns its exit code, 130 after Ctrl-C."""
     try:
         from sls.launcher.commands import main
-        return main(sys.argv[1:])
+        from sls.launcher.place import printing
+        code = 0
+        with printing():
+            code = main(sys.argv[1:])
+        return code
     except KeyboardInterrupt:
         return 130
 

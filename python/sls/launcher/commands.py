@@ -16,8 +16,8 @@ from sls.launcher.completion import CONTROLS, FLOWN
 from sls.launcher.docker_demo import docker_demo
 from sls.launcher.fuzzing import fuzz
 from sls.launcher.listing import print_list
-from sls.launcher.place import (BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, IS_OF_PIP, PYTHON_PATH, ROOT, SELF, Failure, find_file,
-                                list_choices, say, suggest)
+from sls.launcher.place import (BUILD, IS_BUILT_ELSEWHERE, IS_INSTALLED, IS_OF_PIP, PYTHON_PATH, ROOT, SELF, STRAY_VARIABLES, Failure,
+                                expect_no_folder_of_recordings, find_file, list_choices, say, suggest)
 
 USAGE = """\
 usage: ./sls COMMAND [OPTIONS]
@@ -174,12 +174,16 @@ def campaign_worker(words: list[str]) -> NoReturn:
 
 
 def check(words: list[str]) -> NoReturn:
-    if not is_help_asked(words):
-        is_judging = any(word.startswith("--recording") for word in words)
-        has_pages = any(word.startswith("--report") for word in words)
-        build_programs("_sls_core", *([] if is_judging else [*FLYING, "sls_worlds"]),
-                       *(["sls_view"] if has_pages else []))
-    call_script("@install", "python_packages")
+    is_judging = any(word.startswith("--recording") for word in words)
+    has_pages = any(word.startswith("--report") for word in words)
+    try:
+        if not is_help_asked(words):
+            build_programs("_sls_core", *([] if is_judging else [*FLYING, "sls_worlds"]), *["sls_view"] * has_pages)
+        call_script("@install", "python_packages")
+    except SystemExit as error:
+        from sls.check.results import refuse  # the launcher alone need not load it
+        text = "expected programs that can be built, got the errors above"
+        raise error if error.code in (130, 143) else SystemExit(refuse(words, text)) from None
     replace_by_module("sls.check", *words, SLS_BUILD=str(BUILD), SLS_VIEW=str(BUILD / "bin/sls_view"))
 
 
@@ -238,9 +242,7 @@ def test(words: list[str]) -> NoReturn:
         call_script("@tree", "asan", ROOT / "build-asan", "test_programs")
     if preset != "asan":
         call_script("@tree", preset, folder, *(["threaded_tests"] if preset == "tsan" else []))
-    # The tests must not get variables that the middleware reads from the environment.
-    hidden = [f"--unset={name}" for name in ("ROS_DISCOVERY_SERVER", "FASTRTPS_DEFAULT_PROFILES_FILE",
-                                             "FASTDDS_DEFAULT_PROFILES_FILE", "SLS_DOMAIN")]
+    hidden = [f"--unset={name}" for name in STRAY_VARIABLES]
     # Most tests wait for processes and discovery: one more than there are cores leaves none idle.
     os.chdir(ROOT)
     replace_by("env", *hidden, "ctest", "--preset", preset, "--parallel", str(len(os.sched_getaffinity(0)) + 1),
@@ -330,6 +332,8 @@ def check_words(command: str, words: list[str]) -> None:
             takes_value = bool(known.get(word, ("",))[0])
     if command == "ctl" and others and others[0] not in CONTROLS:
         raise Failure(f"ctl: expected {list_choices(CONTROLS)}, got '{others[0]}'{suggest(others[0], CONTROLS)}", 2)
+    for name in others if command in ("convert", "plot", "report", "verify", "view") else ():
+        expect_no_folder_of_recordings(name)
     if command == "campaign" and len(others) == 1:
         find_file("campaigns", others[0])
 

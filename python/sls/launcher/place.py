@@ -1,9 +1,12 @@
 """Where the launcher is and what it says: paths, messages, names of scenarios."""
 
+import codecs
 import difflib
 import os
+import re
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -18,6 +21,9 @@ BUILD = Path(os.environ.get("SLS_BUILD") or (ROOT if IS_INSTALLED else ROOT / "b
 PYTHON_PATH = [] if IS_OF_PIP else [str(ROOT / "python"), str(BUILD / "python")]
 if IS_INSTALLED and not IS_OF_PIP:
     PYTHON_PATH.append(str(ROOT.parents[1] / "lib/python3/dist-packages"))
+# The middleware reads them. Flights that tests or checks start must not: they have a domain and a profile of their own.
+STRAY_VARIABLES = ("ROS_DISCOVERY_SERVER", "ROS_SUPER_CLIENT", "FASTRTPS_DEFAULT_PROFILES_FILE", "SLS_DOMAIN",
+                   "FASTDDS_DEFAULT_PROFILES_FILE", "FASTDDS_ENVIRONMENT_FILE", "FASTDDS_BUILTIN_TRANSPORTS")
 
 
 class Failure(Exception):
@@ -28,9 +34,63 @@ class Failure(Exception):
         self.code = code
 
 
-def say(text: str) -> None:
-    text = text.replace("see ./sls", f"see {SELF}")
-    print(f"sls: {text}", file=sys.stderr, flush=True)
+# C0, DEL, C1, separators of lines, changes of direction, bytes that are not UTF-8.
+CONTROLS = re.compile("[\0-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def escape_controls(text: object) -> str:
+    """`text`, which may be of a file or of the network, in one line that cannot control a terminal."""
+    return CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode(), str(text))
+
+
+def say(*lines: str) -> None:
+    text = "\n".join(map(escape_controls, lines)).replace("see ./sls", f"see {SELF}")
+    try:
+        print(f"sls: {text}", file=sys.stderr, flush=True)
+    except OSError:
+        drop(2)
+
+
+def drop(descriptor: int) -> None:
+    """What is still written there is lost: it has no reader, or its disk is full."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
+
+
+def find_width() -> int:
+    """Columns of the terminal on standard output. A pipe and a file take lines of any length."""
+    import shutil  # takes longer to load than this module
+    return shutil.get_terminal_size().columns if sys.stdout and sys.stdout.isatty() else 10**6
+
+
+SIGNS = {"≤": "<=", "≥": ">=", "…": "...", "×": "x", "–": "-"}
+
+
+def spell(error: UnicodeError) -> tuple[str, int]:
+    """What ASCII or Latin-1 lack, in letters of ASCII."""
+    assert isinstance(error, UnicodeEncodeError)
+    text = "".join(SIGNS.get(sign, sign) for sign in error.object[error.start:error.end])
+    return text.encode("ascii", "backslashreplace").decode(), error.end
+
+
+codecs.register_error("spell", spell)
+
+
+@contextmanager
+def printing() -> Iterator[None]:
+    """In it, standard output takes every text in any encoding, and its reader may go, as `head` does."""
+    if hasattr(sys.stdout, "reconfigure"):
+        sys.stdout.reconfigure(errors="spell")
+    try:
+        yield
+        if sys.stdout:
+            sys.stdout.flush()
+    except BrokenPipeError:
+        drop(1)
+
+
+def show(text: str) -> None:
+    """Prints `text`, which may have several lines, on standard output."""
+    print("\n".join(map(escape_controls, text.split("\n"))))
 
 
 def list_names(kind: str) -> list[str]:
@@ -46,6 +106,15 @@ def suggest(word: str, names: Iterable[str]) -> str:
     """The end of an error line: the name that is nearest to the word, if one is near."""
     near = difflib.get_close_matches(word, list(names), 1, 0.65)
     return f"; did you mean '{near[0]}'?" if near else ""
+
+
+def expect_no_folder_of_recordings(name: str) -> None:
+    """Raises Failure, which names the newest recordings in the folder."""
+    found = [file.parent for file in Path(name).glob("*/manifest.json")]
+    if found and not Path(name, "manifest.json").exists():
+        newest = sorted(found, key=lambda folder: folder.stat().st_mtime, reverse=True)[:3]
+        raise Failure(f"{name}: expected a recording, got a folder of {len(found)}; the newest: "
+                      + ", ".join(map(str, newest)), 2)
 
 
 def find_file(kind: str, name: str) -> str:

@@ -19,6 +19,7 @@ MISTAKES = [
     ("", ":1: expected a check: scenario, expect …, got nothing"),
     ("expect: [{ outcome: finished }]", "scenario: missing key"),
     ("scenario: short", "expect: missing key"),
+    ((SHIPPED / "short.yaml").read_text(), "expected a check, which names a scenario", "got a scenario: ./sls run flies it"),
     ("scenario: shrot\nexpect: [{ outcome: finished }]", ":1: scenario: expected a scenario, got no such file"),
     ("scenario: none.yaml\nexpect: [{ outcome: finished }]", ":1: scenario: expected a scenario, got no such file"),
     ("scenario: short\nexpects: []", ":2: expects: unknown key; did you mean 'expect'?"),

@@ -186,7 +186,10 @@ def test_the_verdict_names_what_a_controller_did(check, impatient, monkeypatch, 
         return
     page = (tmp_path / "pages/check-shm/report.html").read_text()
     assert expected.partition(",")[0].replace("'", "&#x27;") in page and "Output of the programs" in page
-    assert (tmp_path / "pages/index.html").is_file()
+    assert re.search('class="badge (.*?)<', page)[1] == 'bad">not held'
+    index = (tmp_path / "pages/index.html").read_text()
+    assert "<h1>Checks</h1>" in index and "1 flight: 1 not held" in index and "badge bad" in index, index
+    assert "<th>verdict</th>" in index and expected.partition(",")[0].replace("'", "&#x27;") in index
 
 
 @pytest.mark.parametrize("controller, expected", [
@@ -226,6 +229,36 @@ def test_a_controller_that_cannot_be_used_is_a_mistake(check, tmp_path, controll
     (tmp_path / "docker").chmod(0o755)
     code, flights, said = check(controller, "--placement", "shm")
     assert code == 2 and flights[0]["verdict"] == "unusable" and flights[0]["problems"][0].startswith(expected), said
+
+
+CHECK = f"{sys.executable} -BP -m sls.check check.yaml --junit junit.xml"
+SHM = f"{CHECK} --placement shm"
+
+
+@pytest.mark.parametrize("code, command, expected", [
+    (0, f"PYTHONIOENCODING=ascii {CHECK}", "<= 0.05"),
+    (0, f"PYTHONIOENCODING=latin-1 {CHECK}", "<= 0.05"),
+    (0, f"{CHECK} 2>&1 | true; exit $PIPESTATUS", ""),
+    (2, f"{CHECK} >/dev/full", "No space"),
+    (0, f"ROS_DISCOVERY_SERVER=127.0.0.1:1 FASTDDS_ENVIRONMENT_FILE=none SLS_DOMAIN=x {SHM}", "1 held"),
+    (2, f"TMPDIR=$PWD/$'\\xff' && mkdir $TMPDIR && export TMPDIR && {CHECK}", "expected a path in UTF-8, got byte 0xff"),
+    (2, f"mkdir full && mount -t tmpfs -o size=40k none full && TMPDIR=$PWD/full {CHECK}", "flight, got: No space"),
+    (2, f"mkdir full && mount -t tmpfs -o size=40k none full && TMPDIR=$PWD/full {SHM}", "flight, got: No space"),
+    (2, f"mount -t tmpfs -o size=64k none /dev/shm && {SHM}", "/dev/shm: expected room for a flight, got: No space"),
+    (2, f"mount -t tmpfs -o ro none /dev/shm && {SHM}", "/dev/shm: expected room for a flight, got: Read-only"),
+    (0, f"mount -t tmpfs -o ro none /dev/shm && {CHECK} --placement udp", "1 held"),
+    (2, f"echo raise OSError >numpy.py; PYTHONPATH=.:$PYTHONPATH {CHECK}", "OSError"),
+])
+def test_the_environment_is_not_the_controller(tmp_path, code, command, expected):
+    if "mount" in command and not IS_ROOT:
+        pytest.skip("a file system of its own needs root")
+    (tmp_path / "mine.yaml").write_text(SCENARIO.replace("for_s: 20", "for_s: 6"))
+    (tmp_path / "check.yaml").write_text("scenario: mine.yaml\nexpect: [{ measure: load_error_end_m, max: 0.05 }]\n")
+    done = subprocess.run([*["unshare", "-m"] * IS_ROOT, "bash", "-c", command], cwd=tmp_path, text=True, timeout=60,
+                          stdout=subprocess.PIPE, stderr=subprocess.STDOUT, errors="replace")
+    assert done.returncode == code and expected in done.stdout and "Traceback" not in done.stdout, done.stdout
+    suites = ElementTree.parse(tmp_path / "junit.xml").getroot()
+    assert [suites.get(key) for key in ("failures", "errors")] == ["0", str(code // 2)]
 
 
 def test_a_controller_whose_port_is_in_use_is_quoted(check):

@@ -14,8 +14,13 @@ import sls
 from sls.check.check_file import load_check
 from sls.check.cli import main
 from sls.check.difference import find_difference
-from sls.check.judge import judge, open_recording
-from sls.check.results import Result, write_json, write_junit
+from sls.check.judge import Judged, judge, open_recording
+from sls.check.results import Result, make_rows, write_json, write_junit
+
+
+def test_the_table_fits_a_terminal_and_is_whole_in_a_pipe():
+    results = [Result("gazebo_corrected", "", "in-process", judged=[Judged("load_error_max_m, stage 3", True, "x" * 64)])]
+    assert [len(line) for line in make_rows(results, 80)] == [80, 77] and "x" * 64 in make_rows(results)[1]
 
 
 @pytest.fixture(scope="module")
@@ -219,7 +224,9 @@ def test_junit_and_json_have_one_entry_for_each_flight(tmp_path, flown):
     assert [suite.get("name") for suite in root] == ["one", "two"]
     failed, passed = root[0].findall("testcase")
     assert failed.get("classname") == "one" and failed.get("name") == "shm" and float(failed.get("time")) == 0
-    assert failed.find("failure").get("message") == "controller: ?[1m<killed> & \"gone\""
+    assert failed.find("failure").get("message") == "one.yaml: controller: ?[1m<killed> & \"gone\""
+    assert root[1].find("testcase/error").get("message") == "two.yaml:1: no"
+    assert {key for case in root.iter("testcase") for key in case.attrib} == {"classname", "name", "time"}  # Ant's
     assert "server: a?" in failed.find("system-err").text and len(passed) == 0
     data = json.loads((tmp_path / "out/json.json").read_text())
     assert data["exit_code"] == 2 and [one["verdict"] for one in data["flights"]] == ["not held", "held", "unusable"]

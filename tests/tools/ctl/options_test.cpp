@@ -64,6 +64,9 @@ TEST(OperatorOptionsTest, TheDefaultsAreTheDocumentedOnes) {
   EXPECT_EQ(options.common.domain, 0);
   EXPECT_EQ(options.vehicle_id, 0u);
   EXPECT_EQ(options.timeout_s, 10.0);
+  EXPECT_EQ(parse("status").timeout_s, 3.0);
+  EXPECT_EQ(parse("status --watch").timeout_s, 10.0);
+  EXPECT_EQ(parse("status --timeout-s 7").timeout_s, 7.0);
 }
 
 TEST(OperatorOptionsTest, AnUnknownCommandIsRefusedAndNamed) {

@@ -144,7 +144,7 @@ TEST(ViewSystemTest, BadUsageIsOneLineAndExitCode2) {
   };
   expect_refused({"--listen", "0.0.0.0", "--port", "0"}, "--token-file");
   expect_refused({"--listen", "nowhere", "--port", "0"}, "--listen");
-  expect_refused({"--port", "65536"}, "--port");
+  expect_refused({"--port", "99999"}, "--port: expected 0 to 65535, got '99999'");
   expect_refused({"--token-file", "/nowhere/token"}, "/nowhere/token");
   expect_refused({"--export", "/tmp/page.html"}, "--export: expected a recording");
   const auto first = start_viewer(domain);
