@@ -6,6 +6,7 @@
 #include <type_traits>
 
 #include "common/config/config_error.hpp"
+#include "common/config/yaml_node.hpp"
 
 namespace sls::record {
 namespace {
@@ -34,8 +35,9 @@ struct FieldParser {
     const std::string_view text = file.fields()[index];
     const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
     if (error != std::errc() || end != text.data() + text.size())
-      throw DamagedError(file.place() + file.columns()[index] + ": expected a number, got '" +
-                         std::string(text) + "'");
+      throw DamagedError(file.place() + config::to_printable(file.columns()[index]) +
+                         ": expected a number, got '" + config::to_printable(std::string(text)) +
+                         "'");
     ++index;
   }
   void parse(std::string& text) { text = file.fields()[index++]; }

@@ -11,7 +11,7 @@
 #include <set>
 #include <type_traits>
 
-#include "common/text/regular_file.hpp"
+#include "common/config/yaml_node.hpp"
 #include "recorder/certificate.hpp"
 
 namespace sls::record {
@@ -23,12 +23,7 @@ namespace fs = std::filesystem;
 
 /// Hash and number of rows of a file, in one pass.
 ManifestFile::File measure(const fs::path& path) {
-  std::ifstream stream;
-  try {
-    stream = text::open_regular_file(path);
-  } catch (const text::NoRegularFile& error) {
-    throw DamagedError(path.string() + ": cannot read: expected a file, got " + error.what());
-  }
+  std::ifstream stream = open_recorded_file(path);
   text::Sha256 hash;
   std::uint64_t lines = 0;
   bool is_quoted = false;
@@ -106,7 +101,9 @@ struct FieldLister {
   static std::string format(const Number& number) {
     return fmt::format("{}", number);
   }
-  static std::string format(const std::string& text) { return "'" + text + "'"; }
+  static std::string format(const std::string& text) {
+    return "'" + config::to_printable(text) + "'";
+  }
 };
 
 template <class Row>
@@ -135,11 +132,12 @@ std::optional<std::string> compare_rows(const StepRows& a, const StepRows& b,
   const std::vector<std::string> columns = read_columns<Row>(flight);
   for (std::size_t i = 0; i < std::min({of_a.texts.size(), of_b.texts.size(), columns.size()}); ++i)
     if (of_a.texts[i] != of_b.texts[i])
-      return fmt::format(
-          "{}, {}: {} in A, {} in B{}", place, columns[i], of_a.texts[i], of_b.texts[i],
-          of_a.are_nan[i] && of_b.are_nan[i]   ? " (neither is a number; their signs differ)"
-          : of_a.numbers[i] == of_b.numbers[i] ? " (equal numbers of other bits)"
-                                               : "");
+      return fmt::format("{}, {}: {} in A, {} in B{}", place, config::to_printable(columns[i]),
+                         of_a.texts[i], of_b.texts[i],
+                         of_a.are_nan[i] && of_b.are_nan[i]
+                             ? " (neither is a number; their signs differ)"
+                         : of_a.numbers[i] == of_b.numbers[i] ? " (equal numbers of other bits)"
+                                                              : "");
   return fmt::format("{}: {} fields in A, {} in B", place, of_a.texts.size(), of_b.texts.size());
 }
 

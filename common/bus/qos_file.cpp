@@ -9,7 +9,6 @@
 #include <charconv>
 #include <cstdint>
 #include <cstdlib>
-#include <fstream>
 #include <map>
 #include <memory>
 #include <sstream>
@@ -20,6 +19,7 @@
 
 #include "common/bus/topics.hpp"
 #include "common/config/config_error.hpp"
+#include "common/config/scenario_reader.hpp"
 #include "fastdds_api.hpp"
 
 namespace sls::bus {
@@ -70,28 +70,6 @@ void collect_profiles(const tinyxml2::XMLElement& element, const std::string& pl
   }
   for (auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement())
     collect_profiles(*child, place, found);
-}
-
-std::string read_file(const std::filesystem::path& file) {
-  std::error_code error;
-  const auto status = std::filesystem::status(file, error);
-  if (!std::filesystem::exists(status))
-    throw ConfigError(file.string() + ": expected a QoS file, got no such file");
-  if (std::filesystem::is_directory(status))
-    throw ConfigError(file.string() + ": expected a QoS file, got a directory");
-  if (!std::filesystem::is_regular_file(status))  // reading it might never end
-    throw ConfigError(file.string() + ": expected a QoS file, got a pipe, socket or device");
-  const auto size = std::filesystem::file_size(file, error);
-  if (!error && size > kMaxBytes)
-    throw ConfigError(file.string() + ": expected at most " + std::to_string(kMaxBytes) +
-                      " bytes, got " + std::to_string(size));
-  std::ifstream stream(file, std::ios::binary);
-  std::ostringstream text;
-  if (!stream || !(text << stream.rdbuf()))
-    throw ConfigError(
-        file.string() + ": expected a readable QoS file, got " +
-        (size == 0 ? std::string("an empty file") : std::generic_category().message(errno)));
-  return text.str();
 }
 
 std::string join_names(const std::map<std::string, Found>& found) {
@@ -332,7 +310,7 @@ void check_names(const std::map<std::string, Found>& found, const std::string& p
 void add_missing_endpoints(tinyxml2::XMLElement& root, std::map<std::string, Found>& found) {
   const auto file = default_qos_file().parent_path() / "endpoints.xml";
   tinyxml2::XMLDocument shared;
-  parse(read_file(file), file.string(), shared);
+  parse(config::read_config_file(file, "a QoS file", kMaxBytes), file.string(), shared);
   auto* profiles = root.FirstChildElement("profiles");
   if (!profiles) return;  // the participant's profile is missing, too, and is reported later
   const auto* shared_profiles = shared.RootElement()->FirstChildElement("profiles");
@@ -354,7 +332,7 @@ std::string find_identity(const std::string& role) {
 std::string read_qos_file(const std::filesystem::path& file, const std::string& identity) {
   const std::string place = file.string();
   tinyxml2::XMLDocument document;
-  parse(read_file(file), place, document);
+  parse(config::read_config_file(file, "a QoS file", kMaxBytes), place, document);
 
   std::map<std::string, Found> found;
   if (auto* root = document.RootElement()) {
@@ -383,7 +361,7 @@ std::string describe_refusal(const std::filesystem::path& file, const std::strin
     return file.string() + ": expected profiles that " + version + " takes, got: " + cause;
   const std::string key = cause.substr(at + kBefore.size());
   tinyxml2::XMLDocument document;
-  parse(read_file(file), file.string(), document);
+  parse(config::read_config_file(file, "a QoS file", kMaxBytes), file.string(), document);
   const int line = find_line(*document.RootElement(), key);
   return file.string() + (line > 0 ? ":" + std::to_string(line) : "") + ": <" + key +
          ">: expected a key of " + version + ", got a misspelt one or one of another version (" +

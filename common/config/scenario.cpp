@@ -10,7 +10,6 @@
 #include "common/config/numbers.hpp"
 #include "common/config/scenario_reader.hpp"
 #include "common/config/scenario_writer.hpp"
-#include "common/text/regular_file.hpp"
 #include "common/text/sha256.hpp"
 
 namespace sls::config {
@@ -299,28 +298,34 @@ void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
 
 }  // namespace
 
+std::ifstream open_regular_file(const std::filesystem::path& file, const std::string& kind) {
+  namespace fs = std::filesystem;
+  const auto fail = [&](const std::string& found) {
+    throw make_error(file.string(), 0, "", "expected " + kind + ", got " + found);
+  };
+  std::error_code error;
+  const fs::file_status status = fs::status(file, error);
+  if (!fs::exists(status)) fail("none (" + error.message() + ")");
+  if (fs::is_directory(status)) fail("a directory");
+  if (!fs::is_regular_file(status)) fail("a pipe, socket or device");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) fail("none that can be read (" + std::generic_category().message(errno) + ")");
+  return stream;
+}
+
 std::string read_config_file(const std::filesystem::path& file, const std::string& kind,
                              std::size_t most) {
-  namespace fs = std::filesystem;
-  const auto fail = [&](const std::string& expectation, const std::string& found) {
-    throw make_error(file.string(), 0, "", "expected " + expectation + ", got " + found);
-  };
-  std::ifstream stream;
-  try {
-    stream = text::open_regular_file(file);
-  } catch (const text::NoRegularFile& error) {
-    fail(kind, error.what());
-  }
-  std::error_code error;
-  const std::uintmax_t size = fs::file_size(file, error);
-  if (error) fail(kind, error.message());
-  if (size > most) fail("at most " + std::to_string(most) + " bytes", std::to_string(size));
-
-  std::string text(static_cast<std::size_t>(size), '\0');
-  stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-  if (stream.bad()) fail("a readable file", std::generic_category().message(errno));
-  text.resize(static_cast<std::size_t>(stream.gcount()));
-  if (text.empty()) fail(kind, "an empty file");
+  std::ifstream stream = open_regular_file(file, kind);
+  const auto size = static_cast<std::size_t>(stream.seekg(0, std::ios::end).tellg());
+  if (size == 0 || size > most)
+    throw make_error(file.string(), 0, "",
+                     size == 0 ? "expected " + kind + ", got an empty file"
+                               : "expected at most " + std::to_string(most) + " bytes, got " +
+                                     std::to_string(size));
+  std::string text(size, '\0');
+  stream.seekg(0).read(text.data(), static_cast<std::streamsize>(size));
+  if (!stream)
+    throw make_error(file.string(), 0, "", "expected " + kind + ", got none that can be read");
   return text;
 }
 

@@ -92,6 +92,11 @@ std::string to_leaf(const YamlNode& node) {
   return "";
 }
 
+/// In quotes if readers of YAML 1.1 take it for true.
+std::string to_key(const YamlNode& node) {
+  return node.text == "on" ? to_quoted(node.text) : to_leaf(node);
+}
+
 /// A list of numbers, in one line.
 bool is_row(const YamlNode& node) {
   return node.kind == YamlNode::Kind::kList &&
@@ -122,7 +127,7 @@ void write(const YamlNode& node, std::size_t depth, std::string& text) {
   const std::string indent(2 * depth, ' ');
   if (is_leaf(node)) text += indent + to_leaf(node) + "\n";
   for (std::size_t i = 0; i < node.items.size(); ++i) {
-    text += indent + (node.kind == YamlNode::Kind::kMap ? to_leaf(node.keys[i]) + ":" : "-");
+    text += indent + (node.kind == YamlNode::Kind::kMap ? to_key(node.keys[i]) + ":" : "-");
     write_value(node.items[i], depth + 1, text);
   }
 }

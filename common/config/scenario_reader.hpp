@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <initializer_list>
 #include <map>
 #include <optional>
@@ -285,7 +286,12 @@ void KeyNames::model(const char* name, ModelName& field, ModelRegistry<Section> 
     owners_.emplace(key, "a key of " + all + ", here " + name + " is '" + field.name + "'");
 }
 
-/// The bytes of a file; `kind` names it in errors: `a scenario file`.
+/// Opens a regular file for reading; `kind` names it in errors: `a scenario file`. A pipe or a
+/// device is refused: its reader could wait, or read, for ever.
+/// @throws ConfigError
+std::ifstream open_regular_file(const std::filesystem::path& file, const std::string& kind);
+
+/// The bytes of a regular file.
 /// @throws ConfigError for a file that is empty, cannot be read, or has more than `most` bytes.
 std::string read_config_file(const std::filesystem::path& file, const std::string& kind,
                              std::size_t most = kMaxScenarioBytes);

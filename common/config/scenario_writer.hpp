@@ -5,6 +5,7 @@
 #include <initializer_list>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <type_traits>
 #include <vector>
 
@@ -68,7 +69,8 @@ class MapWriter {
 
   template <class Field, class... Rule>
   void key(Presence, const char* name, Field& field, const Rule&... rule) {
-    text_ += next_ + name + ":";
+    // A plain `on` is true to readers of YAML 1.1.
+    text_ += next_ + (name == std::string_view("on") ? "\"on\"" : name) + ":";
     next_ = indentation_;
     if constexpr (kOnOneLine<Field>) {
       text_ += " " + to_yaml_value(field) + "\n";

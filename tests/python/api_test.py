@@ -11,6 +11,7 @@ import sls
 import yaml
 from places import ROOT, run_python
 from scipy.linalg import solve_continuous_are
+from sls.scenario import read_keys
 
 SHORT = ROOT / "config/scenarios/short.yaml"
 
@@ -31,6 +32,15 @@ def test_a_scenario_without_changes_is_its_file():
         assert scenario.vehicle.load_mass_kg == values["vehicle"]["load_mass_kg"]
         assert scenario.folder == str(SHORT.parent)
         assert len(scenario.vehicles) == 1
+
+
+def test_python_reads_a_scenario_as_the_programs_do(tmp_path):
+    for number in ("010", "+010.0", "1e1", "10.", "1.0E+01"):
+        (tmp_path / "s.yaml").write_text(SHORT.read_text().replace("rod_length_m: 1.0", f"rod_length_m: {number}"))
+        scenario = sls.load_scenario(tmp_path / "s.yaml")
+        assert scenario.vehicle.rod_length_m == read_keys(scenario)["vehicle"]["rod_length_m"] == 10
+    scenario = sls.load_scenario("short", faults=[{"freeze": {"on": "state", "from_s": 1, "to_s": 2}}])
+    assert read_keys(scenario)["faults"] == yaml.safe_load(scenario.text)["faults"]  # which takes a plain `on` for true
 
 
 def test_changes_are_in_the_text_and_in_force(tmp_path):

@@ -235,17 +235,6 @@ class ReportTest(CampaignTest):
                                      rows=[[run, run, "finished", "", 1, ""] for run in range(9)])
         self.assertIn("Nothing was measured", make_campaign_report(folder))
 
-    def test_missing_and_damaged_files_are_refused_in_one_line(self):
-        folder = self.write_campaign()
-        (folder / "manifest.json").write_text("{")
-        self.expect_input_error(lambda: make_campaign_report(folder),
-                                "manifest.json: expected JSON")
-        (folder / "manifest.json").unlink()
-        self.expect_input_error(lambda: make_campaign_report(folder), "manifest.json", "No such")
-        (folder / "manifest.json").write_text("{}")
-        self.expect_input_error(lambda: make_campaign_report(folder),
-                                "manifest.json: campaign: expected a text, got null")
-
     def test_a_hundred_thousand_runs_make_a_small_page_in_little_memory(self):
         folder = self.folder / "c"
         self.write_campaign(rows=make_rows(100_000))

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <array>
 #include <charconv>
@@ -206,7 +207,7 @@ TEST_F(VerificationTest, FilesThatDifferFromTheManifestAreNamed) {
   EXPECT_EQ(find_difference(), "equal");
   EXPECT_EQ(find_problems(b_).find((b_ / "flight.txt").string() + ": SHA-256"), 0u);
   fs::remove(b_ / "status.csv");
-  EXPECT_NE(find_problems(b_).find((b_ / "status.csv").string() + ": cannot read"),
+  EXPECT_NE(find_problems(b_).find((b_ / "status.csv").string() + ": expected a file, got none"),
             std::string::npos);
 }
 
@@ -385,22 +386,21 @@ TEST_F(VerificationTest, AManifestsNumbersAreWholeNumbersThatFit) {
 TEST_F(VerificationTest, APipeOrADeviceInThePlaceOfAFileIsAProblem) {
   for (const std::string file : {"status.csv", "state.csv", "command.csv", "reference.csv"}) {
     fs::remove(b_ / file);
-    file == "state.csv" ? fs::create_symlink("/dev/zero", b_ / file)
-                        : static_cast<void>(::mkfifo((b_ / file).c_str(), 0600));
-    EXPECT_NE(find_problems(b_).find(file + ": cannot read"), std::string::npos) << file;
+    ASSERT_EQ(file == "state.csv" ? ::symlink("/dev/zero", (b_ / file).c_str())
+                                  : ::mkfifo((b_ / file).c_str(), 0600),
+              0);
+    EXPECT_NE(find_problems(b_).find(file + ": expected a file, got a pipe, socket or device"),
+              std::string::npos)
+        << file;
   }
-  EXPECT_THROW(find_difference(), DamagedError);
-  fs::remove(b_ / "manifest.json");
-  ASSERT_EQ(::mkfifo((b_ / "manifest.json").c_str(), 0600), 0);
+  fs::rename(b_ / "status.csv", b_ / "manifest.json");
   const auto find = [&] {
     return sls::test::find_error<config::ConfigError>([&] { open_recording(b_); });
   };
-  const std::string place = (b_ / "manifest.json").string();
-  EXPECT_EQ(find(), place + ": expected a manifest, got a pipe, socket or device");
+  EXPECT_NE(find().find("expected a manifest, got a pipe, socket or device"), std::string::npos);
   fs::remove(b_ / "manifest.json");
-  write_bytes(b_ / "manifest.json", "[");
-  fs::resize_file(b_ / "manifest.json", 1ULL << 40);
-  EXPECT_EQ(find(), place + ": expected at most 2000000 bytes, got 1099511627776");
+  write_bytes(b_ / "manifest.json", std::string(2'000'001, '['));
+  EXPECT_NE(find().find("expected at most 2000000 bytes, got 2000001"), std::string::npos);
 }
 
 }  // namespace

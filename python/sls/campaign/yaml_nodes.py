@@ -235,9 +235,11 @@ def parse_yaml(data: bytes, file: Path) -> Place:
                 fail(file, line, "",
                      f"expected at most {MOST_DEPTH} levels of nesting, got more")
         root = yaml.compose(text, Loader=yaml.SafeLoader)
-    except yaml.YAMLError as error:
+    except InputError:
+        raise
+    except (yaml.YAMLError, ValueError, OverflowError) as error:  # PyYAML lets those of an impossible escape through
         mark = getattr(error, "problem_mark", None)
-        problem = getattr(error, "problem", None) or getattr(error, "reason", "")
+        problem = getattr(error, "problem", None) or getattr(error, "reason", error)
         line = mark.line + 1 if mark else 0
         if not mark and (position := getattr(error, "position", None)) is not None:
             line = text.count("\n", 0, position) + 1
@@ -245,10 +247,6 @@ def parse_yaml(data: bytes, file: Path) -> Place:
             fail(file, line, "", "expected one YAML document, got a second one")
         fail(file, line, "",
              f"expected YAML, got a syntax error: {to_printable(str(problem), 100)}")
-    except (ValueError, OverflowError) as error:  # PyYAML lets those of an impossible escape through
-        if isinstance(error, InputError):
-            raise
-        fail(file, 0, "", f"expected YAML, got a syntax error: {to_printable(str(error), 100)}")
     if root is None:
         mark = yaml.Mark(str(file), 0, 0, 0, None, None)
         root = yaml.ScalarNode("", "", mark, mark)

@@ -4,7 +4,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "common/text/regular_file.hpp"
+#include "common/config/scenario_reader.hpp"
 
 namespace sls::record {
 namespace {
@@ -14,13 +14,14 @@ constexpr std::size_t kLongestRecord = 1 << 20;  // in a valid file: some hundre
 
 }  // namespace
 
+std::ifstream open_recorded_file(const std::filesystem::path& file) try {
+  return config::open_regular_file(file, "a file");
+} catch (const config::ConfigError& error) {
+  throw DamagedError(error.what());
+}
+
 CsvReader::CsvReader(const std::filesystem::path& file, std::string_view header, Further further)
-    : path_(file.string()) {
-  try {
-    stream_ = text::open_regular_file(file);
-  } catch (const text::NoRegularFile& error) {
-    throw DamagedError(path_ + ": cannot read: expected a file, got " + error.what());
-  }
+    : path_(file.string()), stream_(open_recorded_file(file)) {
   const std::string expected(header);
   const bool is_there = find_record();
   const std::string line = is_there ? buffer_.substr(begin_, end_ - begin_) : "";

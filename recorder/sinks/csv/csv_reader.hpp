@@ -17,6 +17,9 @@ class DamagedError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Opens a regular file of a recording. @throws DamagedError
+std::ifstream open_recorded_file(const std::filesystem::path& file);
+
 /// Reads a CSV file row by row (RFC 4180: quoted fields may hold line breaks). A last row without a
 /// line break is ignored: it was cut when its writer was killed.
 class CsvReader {

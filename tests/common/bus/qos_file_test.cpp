@@ -58,7 +58,8 @@ TEST_F(QosFileTest, TheShippedFilesPass) {
 
 TEST_F(QosFileTest, AMissingFileIsNamed) {
   EXPECT_EQ(find_error(folder_ / "nothing.xml"),
-            (folder_ / "nothing.xml").string() + ": expected a QoS file, got no such file");
+            (folder_ / "nothing.xml").string() +
+                ": expected a QoS file, got none (No such file or directory)");
   EXPECT_NE(find_error(""), "no error");
 }
 
@@ -97,7 +98,8 @@ TEST_F(QosFileTest, AnUnreadableFileIsNamedWithTheCause) {
         std::cerr << find_error(folder_ / "qos.xml") << std::endl;
         ::_exit(2);  // skips exit handlers: the parent's threads do not exist here
       },
-      testing::ExitedWithCode(2), "qos.xml: expected a readable QoS file, got Permission denied");
+      testing::ExitedWithCode(2),
+      "qos.xml: expected a QoS file, got none that can be read .Permission denied.");
 }
 
 TEST_F(QosFileTest, TheDefaultOfThisBuildPasses) {

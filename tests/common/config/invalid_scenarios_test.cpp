@@ -91,7 +91,9 @@ TEST_F(UnusableFileTest, UnreadableFile) {
   if (is_root) {
     ASSERT_EQ(seteuid(0), 0);
   }
-  EXPECT_EQ(message, file.string() + ": expected a scenario file, got Permission denied");
+  EXPECT_EQ(
+      message,
+      file.string() + ": expected a scenario file, got none that can be read (Permission denied)");
 }
 
 TEST(InvalidTextTest, NamesTheSenderWhereTextCameOverTheWire) {

@@ -47,6 +47,7 @@ TEST(ScenarioDraftTest, ReplacesValuesInMapsAndLists) {
   draft.set("plant.initial.load_position_m.2", "-1.5");
   const Scenario scenario = draft.make_scenario();
   EXPECT_EQ(scenario.vehicle.load_mass, 0.30000000000000004);
+  EXPECT_NE(scenario.text.find("\"on\": command"), std::string::npos);  // not true, as in YAML 1.1
   ASSERT_EQ(scenario.faults.size(), 1u);
   EXPECT_EQ(std::get<DelayFault>(scenario.faults[0].effect).by_ns, 8'000'000);
   EXPECT_EQ(scenario.plant.initial.position, Eigen::Vector3d(1, 2, -1.5));
