@@ -6,18 +6,16 @@ count that a step wakes; what the others do follows the clock and not the steps.
 """
 
 import re
-import time
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
 from bench.loop import without_recorder
-from bench.programs import MeasurementError, Programs, end_all, wait_for
+from bench.programs import MeasurementError, Programs
 from bench.results import LESS, Figure, format_lines
 
 STEPS = (2000, 4000)
 PERIOD_S = 0.001
-LONGEST_S = 600.0
 PLANTS = {"analytic": "  model: analytic", "slung_load": "  pendulum: ideal"}
 # Threads that a step wakes, without and with recorder. Server: the one that receives the answer
 # flies the step; another one writes the batches. Recorder: one receives, one writes the files.
@@ -117,23 +115,6 @@ def callgrind(programs: Programs, profile: Path, command: list[str]) -> list[str
             "--separate-threads=yes", f"--callgrind-out-file={profile}", *command]
 
 
-def run_together(programs: Programs, commands: dict[str, list[str]]) -> None:
-    """Starts all, and waits until they have ended well."""
-    logs = {name: programs.make_path(".log") for name in commands}
-    processes = {}
-    deadline = time.monotonic() + LONGEST_S
-    try:
-        for name, command in commands.items():
-            processes[name] = programs.start(command, logs[name], may_spin=False)
-        for name, process in processes.items():
-            wait_for(process, deadline)
-            if process.returncode != 0:
-                raise MeasurementError(f"{name}: ended with {process.returncode}: "
-                                       f"{logs[name].read_text().strip()}")
-    finally:
-        end_all(list(processes.values()))
-
-
 def count_flight(programs: Programs, plant: str, is_recorded: bool) -> dict[str, Counter[Function]]:
     """Instructions per step of each function of server, client and, if `is_recorded`, recorder, in
     a figure eight at 1 ms over shared memory."""
@@ -146,18 +127,14 @@ def count_flight(programs: Programs, plant: str, is_recorded: bool) -> dict[str,
             return text if is_recorded else without_recorder(text)
 
         scenario = programs.scenario("figure_eight", change)
-        common = ["--domain", str(domain)]
-        words = {"sim_server": [*common, "--scenario", str(scenario), "--period-s", str(PERIOD_S)],
-                 "control_client": [*common, "--scenario", str(scenario)]}
-        if is_recorded:
-            words["recorder"] = [*common, "--out", str(programs.make_path(""))]
-        for name, flags in words.items():
+        started = programs.make_commands(scenario, programs.make_path("") if is_recorded else None, server=(
+            "--period-s", str(PERIOD_S)), domain=domain)
+        for name, command in started.items():
             profiles[name, steps] = programs.make_path(".callgrind")
-            commands[f"{name} of {steps} steps"] = callgrind(
-                programs, profiles[name, steps], [str(programs.build / "bin" / name), *flags])
-    run_together(programs, commands)
+            commands[f"{name} of {steps} steps"] = callgrind(programs, profiles[name, steps], command)
+    programs.run_together(commands, may_spin=False)
     return {name: calc_per_step(profiles[name, STEPS[0]], profiles[name, STEPS[1]],
-                                STEP_THREADS[name][is_recorded]) for name in words}
+                                STEP_THREADS[name][is_recorded]) for name in started}
 
 
 def find_part(function: Function) -> str:

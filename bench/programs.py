@@ -8,14 +8,13 @@ import signal
 import socket
 import subprocess
 import tempfile
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-LONGEST_S = 300.0  # of one flight
+LONGEST_S = 600.0  # of one flight; callgrind takes minutes
 DOMAINS = range(61, 81, 2)  # and the one after each; tests use the domains below 61
 
 
@@ -54,17 +53,6 @@ def take_domain() -> tuple[int, socket.socket]:
 START = ["setpriv", "--pdeathsig", "TERM", "--"]
 # The limit ends it after ten minutes of processor time, in case no program does.
 COUNTING = ["sh", "-c", "ulimit -t 600; while :; do n=$((n + 1)); done"]
-
-
-def wait_for(process: subprocess.Popen[bytes], deadline: float) -> float:
-    """Waits for the end of `process`. Returns its processor time, s."""
-    while time.monotonic() < deadline:
-        ended, status, usage = os.wait4(process.pid, os.WNOHANG)
-        if ended:
-            process.returncode = os.waitstatus_to_exitcode(status)
-            return usage.ru_utime + usage.ru_stime
-        time.sleep(0.05)
-    raise MeasurementError(f"{process.args}: expected an end within {LONGEST_S:.0f} s")
 
 
 class Programs:
@@ -130,39 +118,51 @@ class Programs:
 
     # --- the three programs -----------------------------------------------------------------------
 
+    def make_commands(self, scenario: Path, recording: Path | None, *common: str, server: tuple[str, ...] = (),
+                      domain: int | None = None) -> dict[str, list[str]]:
+        """The commands of server, client and, with a `recording`, recorder. `common` are options of all of them."""
+        common = ("--domain", str(self.domain if domain is None else domain), *common)
+        flown = [*common, "--scenario", str(scenario)]
+        words = {"sim_server": [*flown, *server], "control_client": flown}
+        if recording:
+            words["recorder"] = [*common, "--out", str(recording)]
+        return {name: [str(self.build / "bin" / name), *flags] for name, flags in words.items()}
+
+    def run_together(self, commands: dict[str, list[str]], *, during: Callable[[], None] | None = None,
+                     may_spin: bool = True) -> tuple[dict[str, float], dict[str, str]]:
+        """Starts the commands together, calls `during`, and waits until all have ended well. Returns the processor time
+        of each, s, and what it printed."""
+        logs = {name: self.make_path(f"-{name}.log") for name in commands}
+        processes: dict[str, subprocess.Popen[bytes]] = {}
+        processor_s = {}
+        try:
+            for name, command in commands.items():
+                processes[name] = self.start(["timeout", f"{LONGEST_S:.0f}", *command], logs[name], may_spin)
+            if during:
+                during()
+            for name, process in processes.items():
+                _, status, usage = os.wait4(process.pid, 0)
+                process.returncode = os.waitstatus_to_exitcode(status)
+                processor_s[name] = usage.ru_utime + usage.ru_stime
+        finally:
+            end_all(list(processes.values()))
+        said = {name: log.read_text() for name, log in logs.items()}
+        for name, process in processes.items():
+            if process.returncode != 0:
+                raise MeasurementError(f"{name} ended with {process.returncode}: {said[name].strip()}")
+        return processor_s, said
+
     def fly(self, scenario: Path, *, qos: str | Path = "default", is_recorded: bool = True,
             server: tuple[str, ...] = (), during: Callable[[], None] | None = None,
             may_spin: bool = True) -> Flight:
         """Flies `scenario` and calls `during` in the flight. Without `may_spin`, the threads of server
         and client that wait for an answer block at once."""
-        common = ["--domain", str(self.domain), "--qos", str(self.qos(qos))]
-        programs = {name: str(self.build / "bin" / name)
-                    for name in ("recorder", "sim_server", "control_client")}
         recording = self.make_path("") if is_recorded else None
-        commands = {"sim_server": [*common, "--scenario", str(scenario), *server],
-                    "control_client": [*common, "--scenario", str(scenario)]}
-        if recording:
-            commands["recorder"] = [*common, "--out", str(recording)]
-        logs = {name: self.make_path(f"-{name}.log") for name in commands}
-        began = time.monotonic()
-        processes = {}
-        try:
-            for name, flags in commands.items():
-                processes[name] = self.start([programs[name], *flags], logs[name], may_spin)
-            if during:
-                during()
-            processor_s = {}
-            for name, process in processes.items():
-                processor_s[name] = wait_for(process, began + LONGEST_S)
-                if process.returncode != 0:
-                    raise MeasurementError(f"{name} ended with {process.returncode}: "
-                                           f"{logs[name].read_text().strip()}")
-        finally:
-            end_all(list(processes.values()))
-        said = logs["sim_server"].read_text()
-        found = re.search(r"finished: (\d+) steps, .*, (\d+) steps/s, \d+ resent, (.*)", said)
+        commands = self.make_commands(scenario, recording, "--qos", str(self.qos(qos)), server=server)
+        processor_s, said = self.run_together(commands, during=during, may_spin=may_spin)
+        found = re.search(r"finished: (\d+) steps, .*, (\d+) steps/s, \d+ resent, (.*)", said["sim_server"])
         if not found:
-            raise MeasurementError(f"sim_server: expected a last line with steps/s, got: {said}")
+            raise MeasurementError(f"sim_server: expected a last line with steps/s, got: {said['sim_server']}")
         manifest = json.loads((recording / "manifest.json").read_text()) if recording else {}
         return Flight(int(found[1]), float(found[2]), found[3].strip(), processor_s, manifest)
 

@@ -8,11 +8,13 @@ namespace sls::control {
 namespace {
 
 /// The scenario of the client with the period of the run.
-config::Scenario make_scenario(config::Scenario scenario, const Parameters& parameters) {
+config::Scenario make_scenario(config::Scenario scenario, const Parameters& parameters,
+                               const std::string& other_flight) {
   if (!(parameters.scenario_sha256() == scenario.sha256))
     throw config::ConfigError(
         fmt::format("scenario '{}': expected the server's, SHA-256 {}, got {}", scenario.name,
-                    parameters.scenario_sha256().c_str(), scenario.sha256));
+                    parameters.scenario_sha256().c_str(), scenario.sha256) +
+        other_flight);
   scenario.sync.period_ns = parameters.period_ns();
   scenario.plant.step_ns = parameters.step_ns();
   return scenario;
@@ -22,7 +24,9 @@ config::Scenario make_scenario(config::Scenario scenario, const Parameters& para
 
 Answerer::Answerer(const config::Scenario& scenario, const sync::Run& run,
                    const std::vector<std::uint32_t>& vehicle_ids, const Options& options)
-    : run_(run), scenario_(make_scenario(scenario, run.parameters)), options_(options) {
+    : run_(run),
+      scenario_(make_scenario(scenario, run.parameters, options.other_flight)),
+      options_(options) {
   for (const std::uint32_t id : vehicle_ids)
     pilots_.emplace(id, Pilot{FlightController(config::make_vehicle_scenario(scenario_, id), id,
                                                options.checks_purity, options.make_law),

@@ -30,6 +30,7 @@ class Answerer {
     std::function<sync::Time()> read_clock;  ///< for the compute times
     /// Gets a line for each answer with an error code.
     std::function<void(const std::string&)> report_error;
+    std::string other_flight;  ///< ends the message about a server with another scenario
   };
 
   /// Flies the vehicles of `vehicle_ids` in `run`, whose scenario is that of the client.

@@ -94,11 +94,13 @@ std::string Client::describe_obstacles() const {
 
 void Client::begin() {
   const std::vector<std::uint32_t> flown_ids = core_.list_flown_ids();
+  const Parameters& parameters = core_.run()->parameters;
+  const bool is_known = parameters.scenario_sha256() == scenario_.sha256;
   auto answerer = std::make_unique<Answerer>(
       scenario_, *core_.run(), flown_ids,
       Answerer::Options{options_.name, options_.strength, options_.checks_purity, options_.make_law,
-                        &Clock::now, [](const std::string& line) { spdlog::error("{}", line); }});
-  const Parameters& parameters = core_.run()->parameters;
+                        &Clock::now, [](const std::string& line) { spdlog::error("{}", line); },
+                        is_known ? "" : node_.describe_other_flight()});
   const bool is_realtime = parameters.mode() == SyncMode::MODE_REALTIME;
   // Made and destroyed without the lock: both wait for running handlers, and our handler waits for
   // the lock.

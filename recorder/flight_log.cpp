@@ -8,6 +8,7 @@
 
 #include "common/bus/names.hpp"
 #include "common/bus/sync_counters.hpp"
+#include "common/text/printable.hpp"
 
 namespace sls::record {
 namespace {
@@ -128,9 +129,8 @@ void FlightLog::add(const SimStatus& status, bool is_repeated) {
 }
 
 void FlightLog::add_event(const std::string& text) {
-  std::string line =
-      fmt::format("step {} ({} s): {}", last_status_.step(), to_time(last_status_.step()), text);
-  std::replace(line.begin(), line.end(), '\n', ' ');
+  std::string line = fmt::format("step {} ({} s): {}", last_status_.step(),
+                                 to_time(last_status_.step()), text::escape_controls(text));
   if (first_events_.size() < kMaxEvents / 2) return first_events_.push_back(std::move(line));
   last_events_.push_back(std::move(line));
   if (last_events_.size() <= kMaxEvents / 2) return;
@@ -139,7 +139,8 @@ void FlightLog::add_event(const std::string& text) {
 }
 
 void FlightLog::write(std::ostream& out) const {
-  out << fmt::format("{}: {}\n", scenario_.name, bus::to_string(last_status_.phase()));
+  out << fmt::format("{}: {}\n", text::escape_controls(scenario_.name),
+                     bus::to_string(last_status_.phase()));
   out << fmt::format("run {:016x}, scenario SHA-256 {}\n\n", parameters_.run_id(),
                      parameters_.scenario_sha256().c_str());
   const VehicleParameters vehicle =
@@ -164,8 +165,8 @@ void FlightLog::write(std::ostream& out) const {
         "{:>24} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8}\n",
         vehicle_id, "rms x", "rms y", "rms z", "max x", "max y", "max z", "at end");
     for (const auto& [index, stage] : stages.listed) {
-      out << fmt::format("  {} {}, {} s to {} s\n", index, stage.name, to_time(stage.first_step),
-                         to_time(stage.last_step))
+      out << fmt::format("  {} {}, {} s to {} s\n", index, text::escape_controls(stage.name),
+                         to_time(stage.first_step), to_time(stage.last_step))
           << format_errors("all", stage.all);
       for (std::size_t lap = 0; lap < stage.laps.size(); ++lap) {
         if (stage.laps[lap].samples() == 0) continue;

@@ -17,6 +17,7 @@
 #include "common/bus/names.hpp"
 #include "common/bus/node.hpp"
 #include "common/config/config_error.hpp"
+#include "common/config/scenario_reader.hpp"
 #include "common/sync/servers.hpp"
 #include "common/text/sha256.hpp"
 
@@ -59,6 +60,7 @@ Json describe_machine() {
 
 /// Limit of vehicles of one server (idl/sls.idl).
 constexpr std::size_t kMaxVehicles = 256;
+constexpr std::size_t kMaxBytes = 2'000'000;  // a thousand gaps take 120,000
 
 /// Begins to write a file to the disk, without waiting for it.
 void begin_sync(const std::filesystem::path& path) {
@@ -244,12 +246,12 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
 
 ManifestFile read_manifest(const std::filesystem::path& folder) {
   const auto path = folder / "manifest.json";
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream)
+  if (std::error_code error; !std::filesystem::exists(path, error))
     throw config::ConfigError(folder.string() +
                               ": expected a recording, got no manifest.json that can be read");
+  const std::string text = config::read_config_file(path, "a manifest", kMaxBytes);
   try {
-    return to_manifest(Json::parse(stream));
+    return to_manifest(Json::parse(text));
   } catch (const Json::exception& error) {
     throw config::ConfigError(path.string() + ": expected a manifest, got: " + error.what());
   } catch (const config::ConfigError& error) {

@@ -100,7 +100,10 @@ void remove_recording(const std::string& place, const fs::path& folder) {
 
 /// True if state.csv has no row: the recorder was killed after it had created the files.
 bool is_without_rows(const fs::path& folder) {
-  std::ifstream file(folder / StateRow::kFile);
+  const fs::path path = folder / StateRow::kFile;
+  std::error_code error;
+  if (!fs::is_regular_file(path, error)) return false;
+  std::ifstream file(path);
   std::string header;
   return file && (!std::getline(file, header) || file.peek() == std::ifstream::traits_type::eof());
 }

@@ -11,6 +11,7 @@
 #include <set>
 #include <type_traits>
 
+#include "common/text/regular_file.hpp"
 #include "recorder/certificate.hpp"
 
 namespace sls::record {
@@ -22,10 +23,12 @@ namespace fs = std::filesystem;
 
 /// Hash and number of rows of a file, in one pass.
 ManifestFile::File measure(const fs::path& path) {
-  std::error_code error;
   std::ifstream stream;
-  if (fs::is_regular_file(path, error)) stream.open(path, std::ios::binary);  // a pipe has no end
-  if (!stream.is_open()) throw DamagedError(path.string() + ": cannot read, or not there");
+  try {
+    stream = text::open_regular_file(path);
+  } catch (const text::NoRegularFile& error) {
+    throw DamagedError(path.string() + ": cannot read: expected a file, got " + error.what());
+  }
   text::Sha256 hash;
   std::uint64_t lines = 0;
   bool is_quoted = false;

@@ -23,6 +23,9 @@ class DomainView : public Surroundings {
   Neighbourhood find_neighbours() override;
   std::string replace_problems(const std::map<std::string, std::string>& found) override;
   std::string describe_isolation() const override { return endpoints_.domain.describe_isolation(); }
+  std::string describe_other_flight() const override {
+    return endpoints_.domain.describe_other_flight();
+  }
   Queues queues() const override {
     return {outbox_.written_records(), outbox_.history_steps(),
             endpoints_.commands.missed_deadlines()};

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <thread>
 
+#include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "common/bus/end_process.hpp"
 #include "common/bus/node.hpp"
@@ -52,6 +53,7 @@ int main(int argc, char** argv) {
 
   const int code = app::run_main(argc, argv, cli, options, "sim_server", [&] {
     config::Scenario scenario = config::load_scenario(scenario_file);
+    if (!scenario.warning.empty()) app::log({true, scenario.warning});
     if (period_s) config::override_period(scenario, *period_s);
     if (!mode.empty())
       scenario.sync.mode =
@@ -65,9 +67,9 @@ int main(int argc, char** argv) {
       bus::check_security_files(bus::read_qos_file(options.qos_file, kIdentity));
       const bool is_lockstep = scenario.sync.mode == config::SyncMode::kLockstep;
       const std::size_t count = assignment.vehicle_ids.size();
-      fmt::print("{}: {}, {} vehicle{}, period {} s\n", scenario.name,
-                 is_lockstep ? "lockstep" : "real time", count, count > 1 ? "s" : "",
-                 scenario.sync.period_ns * 1e-9);
+      app::print(fmt::format("{}: {}, {} vehicle{}, period {} s", scenario.name,
+                             is_lockstep ? "lockstep" : "real time", count, count > 1 ? "s" : "",
+                             scenario.sync.period_ns * 1e-9));
       return;
     }
     bus::Node node(options.qos_file, options.domain, bus::kServerNode, kIdentity);

@@ -1,10 +1,17 @@
 #include "common/app/run_main.hpp"
 
+#include <fcntl.h>
 #include <spdlog/spdlog.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <exception>
+#include <new>
 #include <regex>
 #include <sstream>
+#include <system_error>
 
 #include "common/app/log.hpp"
 #include "common/app/stop_signal.hpp"
@@ -102,11 +109,57 @@ std::string fit(const std::string& help) {
   return text;
 }
 
+/// Opens the standard descriptors that are closed. Otherwise the first files that are opened get
+/// their numbers, and what a library prints goes into a recording.
+void keep_standard_descriptors() {
+  while (true) {
+    const int lowest = ::open("/dev/null", O_RDWR);
+    if (lowest < 0 || lowest > STDERR_FILENO) {
+      if (lowest >= 0) ::close(lowest);
+      return;
+    }
+  }
+}
+
+/// "; the limit is 64 (ulimit -u)", if the shell has set one.
+std::string describe_limit(decltype(RLIMIT_AS) resource, const char* name, rlim_t unit = 1) {
+  struct rlimit limit {};
+  if (::getrlimit(resource, &limit) != 0 || limit.rlim_cur == RLIM_INFINITY) return "";
+  return "; the limit is " + std::to_string(limit.rlim_cur / unit) + " (" + name + ")";
+}
+
+/// What an exception says, and which limit of the system is behind it.
+std::string describe_failure(const std::exception& error) {
+  if (dynamic_cast<const std::bad_alloc*>(&error))
+    return "expected more memory, got none" + describe_limit(RLIMIT_AS, "ulimit -v", 1024);
+  const auto* system = dynamic_cast<const std::system_error*>(&error);
+  if (!system || system->code().category() != std::generic_category()) return error.what();
+  if (system->code().value() == EAGAIN)
+    return "expected another thread, got none" + describe_limit(RLIMIT_NPROC, "ulimit -u");
+  if (system->code().value() == EMFILE)
+    return "expected another descriptor, got none" + describe_limit(RLIMIT_NOFILE, "ulimit -n");
+  return error.what();
+}
+
+/// Says in one line what would otherwise abort: threads of the middleware throw, too.
+[[noreturn]] void end_with_a_line() {
+  try {
+    if (const auto thrown = std::current_exception()) std::rethrow_exception(thrown);
+  } catch (const std::exception& error) {
+    spdlog::error("{}", describe_failure(error));
+    ::_exit(kExitRunFailed);
+  } catch (...) {
+  }
+  std::abort();
+}
+
 }  // namespace
 
 int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
              const std::string& program, const std::function<void()>& work) {
+  keep_standard_descriptors();
   start_log(program, "info");
+  std::set_terminate(end_with_a_line);
   cli.name(program);
   try {
     cli.parse(argc, argv);
@@ -129,7 +182,7 @@ int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
     spdlog::error("{}", error.what());
     code = kExitBadUsage;
   } catch (const std::exception& error) {
-    spdlog::error("{}", error.what());
+    spdlog::error("{}", describe_failure(error));
     code = kExitRunFailed;
   } catch (...) {
     spdlog::error("an exception of unknown type");

@@ -39,11 +39,20 @@ void install_stop_signals(std::chrono::seconds patience) {
   struct sigaction action {};
   sigemptyset(&action.sa_mask);
   action.sa_handler = remember_signal;
-  for (const int number : {SIGINT, SIGTERM}) sigaction(number, &action, nullptr);
+  struct sigaction at_start {};
+  sigaction(SIGHUP, nullptr, &at_start);
+  const bool is_detached = at_start.sa_handler == SIG_IGN;  // nohup
+  for (const int number : {SIGINT, SIGTERM, SIGHUP})
+    if (number != SIGHUP || !is_detached) sigaction(number, &action, nullptr);
   action.sa_handler = give_up;
   sigaction(SIGALRM, &action, nullptr);
   action.sa_handler = SIG_IGN;
   for (const int number : {SIGPIPE, SIGXFSZ}) sigaction(number, &action, nullptr);
+  // Whoever started this program may have blocked them, and a mask is inherited.
+  sigset_t heard;
+  sigemptyset(&heard);
+  for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGALRM}) sigaddset(&heard, number);
+  pthread_sigmask(SIG_UNBLOCK, &heard, nullptr);
 }
 
 int stop_signal() { return received; }
@@ -51,7 +60,9 @@ int stop_signal() { return received; }
 std::string describe_stop() {
   const int signal = received;
   if (signal == 0) return "";
-  return signal == SIGINT ? "interrupted by SIGINT" : "interrupted by SIGTERM";
+  return signal == SIGINT    ? "interrupted by SIGINT"
+         : signal == SIGTERM ? "interrupted by SIGTERM"
+                             : "interrupted by SIGHUP: its terminal or connection has closed";
 }
 
 Unhurried::Unhurried() {

@@ -14,6 +14,7 @@
 #include <fastdds/dds/topic/Topic.hpp>
 
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/spdlog.h>
 #include <sys/statvfs.h>
 #include <algorithm>
 #include <atomic>
@@ -28,16 +29,17 @@
 #include <system_error>
 #include <utility>
 
+#include "common/bus/environment.hpp"
 #include "common/bus/fastdds/data_sharing.hpp"
 #include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
+#include "common/bus/fastdds/guarded_transports.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
 #include "common/bus/fastdds/participant_ids.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "common/bus/fastdds/shared_locks.hpp"
-#include "common/bus/fastdds/small_datagrams.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/fastdds/transports.hpp"
 #include "common/bus/qos_file.hpp"
@@ -72,7 +74,7 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   static std::filesystem::path loaded;
   const std::lock_guard lock(mutex);
   const std::string profiles = read_qos_file(file, identity);
-  const bool is_secured = check_security_files(profiles);
+  const SecurityFiles security = check_security_files(profiles);
   const auto absolute = std::filesystem::canonical(file);
   if (absolute == loaded) return;
   if (!loaded.empty())  // Fast DDS would silently keep its profiles
@@ -81,8 +83,9 @@ void load_profiles(const std::filesystem::path& file, const std::string& identit
   // Only the file of --qos counts, not a stray file with default profiles in the working folder or
   // one that the environment names.
   setenv("SKIP_DEFAULT_XML_FILE", "1", 1);
-  unsetenv(kProfilesVariable);
-  MiddlewareLog::start(is_secured);
+  drop_foreign_variables();
+  if (!security.expiry.empty()) spdlog::warn("{}", security.expiry);
+  MiddlewareLog::start(security.is_secured);
   auto* factory = dds::DomainParticipantFactory::get_instance();
   factory->load_profiles();
   if (!is_ok(factory->load_XML_profiles_string(profiles.data(), profiles.size())))
@@ -144,9 +147,10 @@ struct Node::Impl {
     if (transports == Transports::kAll) shorten_queue(qos.transport());
     is_on_this_machine = are_local(qos.transport());
     has_memory_of_machine = is_on_this_machine && has_shared_memory(qos);
-    limit_datagrams(qos);
+    const std::uint32_t most_sent = limit_datagrams(qos);
     auto& participants = qos.allocation().participants;
     participants.maximum = std::min(participants.maximum, kMaxParticipants);
+    check_environment(qos, domain);
     MiddlewareLog::clear();
     remove_stale_segments();
     expect_room(qos);
@@ -164,8 +168,7 @@ struct Node::Impl {
     announce_what_discovery_lacks(qos);
     listener = std::make_unique<ParticipantListener>(own, &neighbours, &discovered);
     listener->hear(qos);
-    participant = factory->create_participant(static_cast<std::uint32_t>(domain), qos,
-                                              listener.get(), dds::StatusMask::none());
+    participant = create_participant(domain, qos, listener.get(), most_sent);
     if (participant)
       publisher = participant->create_publisher(dds::PUBLISHER_QOS_DEFAULT),
       subscriber = participant->create_subscriber(dds::SUBSCRIBER_QOS_DEFAULT);
@@ -191,6 +194,7 @@ struct Node::Impl {
     auto& properties = qos.properties().properties();
     properties.emplace_back(kVersionProperty, kMiddlewareVersion, true);
     if (!is_secured) return;
+    properties.emplace_back(kProcessProperty, Refusals::name_process(), true);
     use_common_algorithms(qos);
     const IdentityNames names =
         find_identity_names(find_file(qos, kCertificate), find_file(qos, kIdentityAuthority));
@@ -211,12 +215,13 @@ struct Node::Impl {
     return std::max(kLeast, bytes);
   }
 
-  /// Limits outgoing datagrams to the property sls.max_datagram_bytes of the profile, if it is set.
-  void limit_datagrams(dds::DomainParticipantQos& qos) {
+  /// Most bytes of an outgoing datagram by the property sls.max_datagram_bytes of the profile; 0 if
+  /// it is not set.
+  std::uint32_t limit_datagrams(const dds::DomainParticipantQos& qos) {
     constexpr const char* kProperty = "sls.max_datagram_bytes";
     constexpr std::size_t kLeast = 600;  // a vehicle fits
     const auto* text = rtps::PropertyPolicyHelper::find_property(qos.properties(), kProperty);
-    if (!text) return;
+    if (!text) return 0;
     std::size_t bytes = 0;
     const char* end = text->data() + text->size();
     const auto [rest, error] = std::from_chars(text->data(), end, bytes);
@@ -225,9 +230,8 @@ struct Node::Impl {
                         std::to_string(kLeast) + " to " + std::to_string(max_datagram_bytes) +
                         ", got '" + *text + "'");
     max_datagram_bytes = bytes;
-    const std::size_t sent = is_secured ? std::max(bytes, calc_handshake_bytes(qos)) : bytes;
-    for (auto& transport : qos.transport().user_transports)
-      transport = send_small_datagrams(transport, static_cast<std::uint32_t>(sent));
+    return static_cast<std::uint32_t>(is_secured ? std::max(bytes, calc_handshake_bytes(qos))
+                                                 : bytes);
   }
 
   /// The file that a property of DDS Security names as file://…; empty if it names none.
@@ -242,6 +246,19 @@ struct Node::Impl {
     const auto& own = qos.transport().user_transports;
     return qos.transport().use_builtin_transports ||
            std::any_of(own.begin(), own.end(), is_shared_memory);
+  }
+
+  void check_environment(const dds::DomainParticipantQos& qos, int domain) {
+    const auto& port = qos.wire_protocol().port;
+    environment.domain = domain;
+    environment.port_base = port.portBase;
+    environment.domain_gain = port.domainIDGain;
+    environment.uses_shared_memory = has_shared_memory(qos);
+    environment.is_local = is_on_this_machine;
+    environment.most_participants = qos.allocation().participants.maximum;
+    const Environment seen = look_around(environment);
+    environment.addresses_at_start = seen.addresses;
+    if (const std::string error = find_start_error(seen); !error.empty()) throw BusError(error);
   }
 
   /// Fast DDS finds no room only when it writes, and then the process dies of SIGBUS.
@@ -331,6 +348,7 @@ struct Node::Impl {
   ParticipantPorts ports;
   DiscoveredParticipants discovered;
   PeerId self;
+  Environment environment;  // as it was given, and the addresses at the start
   std::unique_ptr<ParticipantListener> listener;
   dds::DomainParticipant* participant = nullptr;
   dds::Publisher* publisher = nullptr;
@@ -376,9 +394,13 @@ std::size_t Node::max_sample_bytes() const { return impl_->max_datagram_bytes - 
 std::string Node::describe_isolation() const {
   constexpr auto kUsualDiscoveryTime = std::chrono::seconds(3);
   const auto* participant = impl_->participant;
-  const bool is_alone = participant->get_participant_names().size() <= 1;  // the first is our own
-  if (!is_alone || std::chrono::steady_clock::now() - impl_->joined < kUsualDiscoveryTime)
-    return "";
+  if (std::chrono::steady_clock::now() - impl_->joined < kUsualDiscoveryTime) return "";
+  Environment environment = impl_->environment;
+  environment.participants = participant->get_participant_names().size();  // the first is our own
+  environment.is_alone = environment.participants <= 1;
+  environment = look_around(environment);
+  if (const std::string cause = find_cause(environment); !cause.empty()) return "; " + cause;
+  if (!environment.is_alone) return "";
   const auto& builtin = participant->get_qos().wire_protocol().builtin;
   const auto name_hosts = [](const auto& locators) {
     std::string hosts;
@@ -397,9 +419,16 @@ std::string Node::describe_isolation() const {
   if (!builtin.initialPeersList.empty())
     return domain + " at " + name_hosts(builtin.initialPeersList) +
            ": is SLS_PEERS right? (./sls doctor)";
+  const std::string elsewhere = bus::describe_other_flight(environment, true);
   return domain +
-         ": another domain or QoS file, or is multicast blocked? try config/qos/unicast.xml, "
-         "or ./sls doctor";
+         (elsewhere.empty() ? ": another domain or QoS file"
+                            : ", but " + elsewhere + ": is --domain right") +
+         ", or is multicast blocked? try config/qos/unicast.xml, or ./sls doctor";
+}
+
+std::string Node::describe_other_flight() const {
+  const std::string text = bus::describe_other_flight(look_around(impl_->environment));
+  return text.empty() ? "" : "; " + text;
 }
 
 PeerId Node::id() const { return to_peer(impl_->participant->get_instance_handle()); }

@@ -53,7 +53,7 @@ class Node {
   /// @throws config::ConfigError if the file cannot be read, is malformed, lacks a profile, has
   ///   content that Fast DDS refuses, or is not the one that this process already uses. The message
   ///   names the file and, if known, the line. Also thrown for a wrong domain.
-  /// @throws BusError if the participant cannot be created.
+  /// @throws BusError if the participant cannot be created, or could not work on this machine.
   Node(const std::filesystem::path& qos_file, int domain, const std::string& name,
        const std::string& identity = {}, Transports transports = Transports::kAll);
   ~Node();
@@ -76,9 +76,13 @@ class Node {
   /// datagram, because datagrams are larger there.
   std::size_t max_batch_bytes() const;
 
-  /// "; " and hints, to be appended to a message about a missing participant, if no other program
-  /// has been discovered 3 s after joining; else empty.
+  /// "; " and the cause, to be appended to a message about a missing participant, from 3 s after
+  /// joining: what this machine tells (environment.hpp); without that a guess if no other program
+  /// has been discovered; else empty.
   std::string describe_isolation() const;
+
+  /// "; " and the server that runs on this domain and machine, with a free domain; else empty.
+  std::string describe_other_flight() const;
 
   /// True if the QoS file restricts this node to its own machine: shared memory, and UDP on
   /// loopback addresses alone. Other programs then discover it within milliseconds, and no packet

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
+#include <cstdint>
 #include <cstdlib>
 #include <fstream>
 #include <map>
@@ -104,6 +106,65 @@ void parse(const std::string& text, const std::string& place, tinyxml2::XMLDocum
                       ": expected well-formed XML, got " + document.ErrorName());
 }
 
+// --- ranges of numbers ---------------------------------------------------------------------------
+
+/// What the number of a key may be. Fast DDS sizes shared memory, sockets and arrays with these
+/// numbers as they are: outside the range programs crash, hang, or fly without a transport.
+struct Range {
+  std::vector<std::string_view> keys;
+  std::int64_t least, most;
+  bool is_zero_default = false;  ///< 0 is the default of the system
+};
+const std::vector<Range>& ranges() {
+  constexpr std::int64_t kMostSeconds = 0x7fffffff, kMostNanoseconds = 0xffffffff;
+  static const std::vector<Range> ranges = {
+      {{"segment_size"}, 131'072, 268'435'456},  // initialising a larger one takes seconds
+      {{"port_queue_capacity"}, 1, 65'536},
+      {{"healthy_check_timeout_ms"}, 10, 3'600'000},
+      {{"maxMessageSize"}, 600, 65'500},
+      {{"sendBufferSize", "receiveBufferSize", "sendSocketBufferSize", "listenSocketBufferSize"},
+       65'536,
+       1'073'741'824,
+       true},
+      {{"TTL"}, 0, 255},
+      {{"maxInitialPeersRange"}, 0, 110},
+      {{"participantID"}, -1, 109},
+      {{"domainIDGain", "participantIDGain"}, 1, 1'000},
+      {{"port", "physical_port", "output_port", "portBase"}, 0, 65'535},
+      {{"offsetd0", "offsetd1", "offsetd2", "offsetd3"}, 0, 65'535},
+      {{"depth"}, 1, 100'000},
+      {{"max_samples", "max_instances", "max_samples_per_instance"}, -1, 1'000'000},
+      {{"allocated_samples", "extra_samples"}, 0, 100'000},
+      {{"readerPayloadSize", "writerPayloadSize"}, 0, 65'500},
+      {{"mutation_tries", "initial", "increment", "max_domains"}, 0, 1'000},
+      {{"max_unicast_locators", "max_multicast_locators"}, 0, 1'000},
+      {{"max_properties", "max_user_data", "max_partitions"}, 0, 65'500},
+      {{"sec"}, 0, kMostSeconds},
+      {{"nanosec"}, 0, kMostNanoseconds}};
+  return ranges;
+}
+
+/// Judges the number of `element`. Other texts are left to Fast DDS, which refuses them.
+void check_range(const tinyxml2::XMLElement& element, const std::string& where) {
+  if (!element.GetText()) return;
+  std::string text = element.GetText();
+  text.erase(0, text.find_first_not_of(" \t\r\n"));
+  text.erase(text.find_last_not_of(" \t\r\n") + 1);
+  if (text.find_first_of("0123456789") > 1) return;  // behind a sign at most
+  for (const Range& range : ranges()) {
+    if (std::find(range.keys.begin(), range.keys.end(), element.Name()) == range.keys.end())
+      continue;
+    std::int64_t number = 0;
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    const bool is_number = error == std::errc() && end == text.data() + text.size();
+    if (is_number && number >= range.least && number <= range.most) return;
+    if (is_number && number == 0 && range.is_zero_default) return;
+    throw ConfigError(where + ": <" + element.Name() + ">: expected " +
+                      (range.is_zero_default ? "0 or " : "") + std::to_string(range.least) +
+                      " to " + std::to_string(range.most) + ", got '" + text + "'");
+  }
+}
+
 // --- parts that depend on the process ------------------------------------------------------------
 
 /// Value of the variable in `${…}`, which is NAME or NAME:-default.
@@ -191,6 +252,7 @@ void complete(tinyxml2::XMLElement& element, const std::string& identity, const 
     throw ConfigError(where + ": <locator>: expected none within another <locator>, got one");
   if (element.FirstChild() && element.FirstChild()->ToText())
     element.SetText(expand(element.GetText(), identity, where).c_str());
+  check_range(element, where);
   for (auto* child = element.FirstChildElement(); child; child = child->NextSiblingElement()) {
     complete(*child, identity, place, is_in_locator || is_locator);
     if (std::string(child->Name()) == "locator") child = expand_locator(*child, place);

@@ -5,14 +5,17 @@
 #include <openssl/pkcs7.h>
 #include <openssl/x509.h>
 #include <openssl/x509_vfy.h>
+#include <spdlog/fmt/chrono.h>
 #include <tinyxml2.h>
 
+#include <algorithm>
 #include <ctime>
 #include <filesystem>
 #include <fstream>
 #include <map>
 #include <memory>
 #include <sstream>
+#include <vector>
 
 #include "common/config/config_error.hpp"
 
@@ -117,6 +120,9 @@ void check_certificate(const std::string& file, X509& certificate,
 
 void check_key(const std::string& file, X509& certificate, const std::string& certificate_file) {
   const Stream stream = open(file);
+  const auto mode = static_cast<unsigned>(std::filesystem::status(file).permissions());
+  if ((mode & 077) != 0)
+    fail(file, fmt::format("expected mode 0600 or stricter, got {:04o}", mode & 07777));
   const Key key(PEM_read_bio_PrivateKey(stream.get(), nullptr, nullptr, nullptr));
   if (!key) fail(file, "expected a private key (PEM), got " + find_openssl_error());
   if (X509_check_private_key(&certificate, key.get()) != 1)
@@ -148,11 +154,36 @@ std::time_t to_time(const tinyxml2::XMLElement* element) {
   return stream.fail() ? 0 : std::mktime(&time);
 }
 
-/// False if `grant` is for another subject. @throws ConfigError if it is not valid now.
-bool check_grant(const tinyxml2::XMLElement& grant, const std::string& subject,
-                 const std::string& file) {
+/// A file and the time at which it ends.
+struct Expiry {
+  std::string file;
+  std::time_t at;
+};
+
+Expiry find_expiry(const std::string& file, const X509& certificate) {
+  std::tm time = {};
+  ASN1_TIME_to_tm(X509_get0_notAfter(&certificate), &time);
+  return {file, ::timegm(&time)};
+}
+
+/// The line about the file that ends first, if that is within 30 days.
+std::string describe_first(const std::vector<Expiry>& all) {
+  const std::time_t now = std::time(nullptr);
+  const auto first = std::min_element(all.begin(), all.end(),
+                                      [](const auto& a, const auto& b) { return a.at < b.at; });
+  constexpr std::time_t kDay = 24 * 60 * 60;
+  if (first->at - now > 30 * kDay) return "";
+  return fmt::format(
+      "{}: expected more than 30 days of validity, got {} (until {:%Y-%m-%d %H:%M} UTC): a running "
+      "flight goes on after that, but no program joins one: renew it with ./sls keys",
+      first->file, std::max<std::time_t>(first->at - now, 0) / kDay, fmt::gmtime(first->at));
+}
+
+/// The end of `grant`; 0 if it is for another subject. @throws ConfigError if it is not valid now.
+std::time_t check_grant(const tinyxml2::XMLElement& grant, const std::string& subject,
+                        const std::string& file) {
   const auto* name = grant.FirstChildElement("subject_name");
-  if (!name || !name->GetText() || name->GetText() != subject) return false;
+  if (!name || !name->GetText() || name->GetText() != subject) return 0;
   const auto* validity = grant.FirstChildElement("validity");
   if (!validity) fail(file, "expected <validity> in the grant for " + subject + ", got none");
   const auto* first = validity->FirstChildElement("not_before");
@@ -164,11 +195,11 @@ bool check_grant(const tinyxml2::XMLElement& grant, const std::string& subject,
   if (now > to_time(last))
     fail(file, std::string("expected permissions that are valid now, got some until ") +
                    (last && last->GetText() ? last->GetText() : "?"));
-  return true;
+  return to_time(last);
 }
 
-void check_permissions(const std::string& file, const std::string& authority_file,
-                       const std::string& subject) {
+Expiry check_permissions(const std::string& file, const std::string& authority_file,
+                         const std::string& subject) {
   const std::string text = verify_document(file, authority_file);
   tinyxml2::XMLDocument document;
   if (document.Parse(text.data(), text.size()) != tinyxml2::XML_SUCCESS)
@@ -177,7 +208,7 @@ void check_permissions(const std::string& file, const std::string& authority_fil
   const auto* permissions = root ? root->FirstChildElement("permissions") : nullptr;
   const auto* grant = permissions ? permissions->FirstChildElement("grant") : nullptr;
   for (; grant; grant = grant->NextSiblingElement("grant"))
-    if (check_grant(*grant, subject, file)) return;
+    if (const std::time_t end = check_grant(*grant, subject, file); end != 0) return {file, end};
   fail(file, "expected permissions for " + subject + ", got none");
 }
 
@@ -200,27 +231,29 @@ IdentityNames find_identity_names(const std::filesystem::path& certificate,
           find_subject(*read_certificate(authority.string()))};
 }
 
-bool check_security_files(const std::string& profiles) {
+SecurityFiles check_security_files(const std::string& profiles) {
   tinyxml2::XMLDocument document;
   std::map<std::string, std::string> properties;
-  if (document.Parse(profiles.data(), profiles.size()) != tinyxml2::XML_SUCCESS) return false;
+  if (document.Parse(profiles.data(), profiles.size()) != tinyxml2::XML_SUCCESS) return {};
   collect_properties(*document.RootElement(), properties);
-  if (properties.count("dds.sec.auth.plugin") == 0) return false;
+  if (properties.count("dds.sec.auth.plugin") == 0) return {};
 
   ERR_clear_error();
   const auto file_of = [&](const std::string& name) { return find_file(properties, name); };
   const std::string certificate_file =
       file_of(std::string(kAuthentication) + "identity_certificate");
   const Certificate certificate = read_certificate(certificate_file);
-  check_certificate(certificate_file, *certificate,
-                    file_of(std::string(kAuthentication) + "identity_ca"));
+  const std::string issuer = file_of(std::string(kAuthentication) + "identity_ca");
+  check_certificate(certificate_file, *certificate, issuer);
   check_key(file_of(std::string(kAuthentication) + "private_key"), *certificate, certificate_file);
 
   const std::string authority = file_of(std::string(kAccess) + "permissions_ca");
   verify_document(file_of(std::string(kAccess) + "governance"), authority);
-  check_permissions(file_of(std::string(kAccess) + "permissions"), authority,
-                    find_subject(*certificate));
-  return true;
+  return {true, describe_first({find_expiry(certificate_file, *certificate),
+                                check_permissions(file_of(std::string(kAccess) + "permissions"),
+                                                  authority, find_subject(*certificate)),
+                                find_expiry(issuer, *read_certificate(issuer)),
+                                find_expiry(authority, *read_certificate(authority))})};
 }
 
 }  // namespace sls::bus

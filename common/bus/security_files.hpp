@@ -5,16 +5,22 @@
 
 namespace sls::bus {
 
+struct SecurityFiles {
+  bool is_secured = false;  ///< `profiles` has properties of DDS Security
+  /// One line if a certificate or the permissions end within 30 days: FILE, when, what then.
+  std::string expiry;
+};
+
 /// Checks the files that the DDS Security properties in `profiles` name, because Fast DDS 2.9.1
 /// only reports "initialization error". `profiles` is a QoS file that `read_qos_file` has
 /// completed.
 /// - Every file is readable.
 /// - The certificate is valid now and signed by the identity authority; the key belongs to it.
+/// - Only its owner may read the key.
 /// - The permissions authority has signed governance and permissions.
 /// - The permissions are for this certificate and valid now.
-/// @returns true if there are such properties: the participant is then secured.
 /// @throws config::ConfigError `FILE: expected …, got …`.
-bool check_security_files(const std::string& profiles);
+SecurityFiles check_security_files(const std::string& profiles);
 
 /// Subjects of a certificate and of the authority's, in RFC 2253 order.
 struct IdentityNames {

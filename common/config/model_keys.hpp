@@ -4,6 +4,8 @@
 /// registers them. How to describe keys: own_keys.hpp.
 #pragma once
 
+#include <cmath>
+#include <cstdint>
 #include <map>
 #include <optional>
 #include <string>
@@ -48,6 +50,12 @@ class ModelKeys {
   virtual std::string find_attitude_key() const { return ""; }
   /// The shape of the vehicles of a plant.
   virtual VehicleShape calc_shape(const Section&) const { return {}; }
+  /// Bound of the fastest swing of vehicle `id` near hover in a plant (its README.md), rad/s.
+  virtual double calc_swing_rate(const Scenario& scenario, std::uint32_t id) const {
+    const model::SlungLoadParameters vehicle = make_vehicle_scenario(scenario, id).vehicle;
+    return std::sqrt(vehicle.total_mass() * vehicle.gravity /
+                     (vehicle.quad_mass * vehicle.rod_length));
+  }
   /// The one load of a plant whose vehicles carry it together. Called after `check`.
   virtual std::optional<model::SharedLoad> calc_shared_load(const Scenario&) const { return {}; }
 };

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <fstream>
 #include <iterator>
 #include <system_error>
@@ -9,6 +10,7 @@
 #include "common/config/numbers.hpp"
 #include "common/config/scenario_reader.hpp"
 #include "common/config/scenario_writer.hpp"
+#include "common/text/regular_file.hpp"
 #include "common/text/sha256.hpp"
 
 namespace sls::config {
@@ -243,6 +245,30 @@ void check_attitudes(const Scenario& scenario, const Places& places) {
     }
 }
 
+/// Refuses a step that is too coarse for the fastest swing, and warns of one that damps it
+/// (sim_server/plants/README.md). A plant in a library has steps of its own.
+void check_step(Scenario& scenario, const Places& places) {
+  constexpr double kMost = 1.0, kFine = 0.25;  // angle of the swing in a step, rad
+  if (scenario.plant.model.is_shared_library()) return;
+  const auto& plant = find_model_keys(places.models().plants, scenario.plant.model);
+  double rate = 0.0;
+  for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id)
+    rate = std::max(rate, plant.calc_swing_rate(scenario, id));
+  const double step = to_seconds(scenario.plant.step_ns), angle = rate * step;
+  if (angle <= kFine) return;
+  const bool is_refused = angle > kMost;
+  std::string message =
+      "expected at most " + to_text(std::floor((is_refused ? kMost : kFine) / rate * 1e6) / 1e6) +
+      " for a swing of " + to_text(std::round(rate * 10.0) / 10.0) + " rad/s, got " + to_text(step);
+  const double kept = std::exp(-std::pow(angle, 5) / 72.0 * 200.0 * M_PI);
+  if (!is_refused)
+    message += ": 100 swings lose " + to_text(std::round(1000.0 * (1.0 - kept)) / 10.0) +
+               " % of their energy";
+  const ConfigError error = places.make_error_at("plant.step_s", message);
+  if (is_refused) throw error;
+  scenario.warning = error.what();
+}
+
 /// Conditions on cable and load need a plant that has cables, and those on the ground a ground.
 void check_conditions(const Scenario& scenario, const Places& places) {
   const auto& load = scenario.shared_load;
@@ -276,25 +302,24 @@ void shift(Scenario& scenario, const Eigen::Vector3d& offset) {
 
 }  // namespace
 
-std::string read_config_file(const std::filesystem::path& file, const std::string& kind) {
+std::string read_config_file(const std::filesystem::path& file, const std::string& kind,
+                             std::size_t most) {
   namespace fs = std::filesystem;
   const auto fail = [&](const std::string& expectation, const std::string& found) {
     throw make_error(file.string(), 0, "", "expected " + expectation + ", got " + found);
   };
+  std::ifstream stream;
+  try {
+    stream = text::open_regular_file(file);
+  } catch (const text::NoRegularFile& error) {
+    fail(kind, error.what());
+  }
   std::error_code error;
-  const fs::file_status status = fs::status(file, error);
-  if (!fs::exists(status)) fail(kind, "none (" + error.message() + ")");
-  if (fs::is_directory(status)) fail(kind, "a directory");
-  if (!fs::is_regular_file(status)) fail(kind, "a pipe, socket or device");
-
-  const std::string size_limit = "at most " + std::to_string(kMaxScenarioBytes) + " bytes";
   const std::uintmax_t size = fs::file_size(file, error);
   if (error) fail(kind, error.message());
-  if (size > kMaxScenarioBytes) fail(size_limit, std::to_string(size));
+  if (size > most) fail("at most " + std::to_string(most) + " bytes", std::to_string(size));
 
-  std::ifstream stream(file, std::ios::binary);
-  if (!stream) fail("a readable file", std::generic_category().message(errno));
-  std::string text(kMaxScenarioBytes + 1, '\0');  // one more, in case it has grown meanwhile
+  std::string text(static_cast<std::size_t>(size), '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) fail("a readable file", std::generic_category().message(errno));
   text.resize(static_cast<std::size_t>(stream.gcount()));
@@ -330,6 +355,7 @@ Scenario read_scenario(const YamlNode& root, const std::string& place, const std
   const auto& plant = find_model_keys(places.models().plants, scenario.plant.model);
   plant.check(scenario, places);
   scenario.shared_load = plant.calc_shared_load(scenario);
+  check_step(scenario, places);
   check_attitudes(scenario, places);
   check_conditions(scenario, places);
   find_model_keys(places.models().laws, scenario.controller.law).check(scenario, places);

@@ -1,6 +1,6 @@
 /// Every key of a scenario, once. Reader, writer and the check for unknown keys all go through
 /// these functions, each with its own kind of `Map`; a new key is one new line here,
-/// and one in tools/reference/meanings.yaml.
+/// and one in docs/reference/scenario.md.
 ///
 ///     map.key(presence, "key", field, rule);     one value, map or list of maps
 ///     map.choose(choice, {{value, {"key", …}}}); exactly one of several alternatives is there

@@ -286,8 +286,9 @@ void KeyNames::model(const char* name, ModelName& field, ModelRegistry<Section> 
 }
 
 /// The bytes of a file; `kind` names it in errors: `a scenario file`.
-/// @throws ConfigError for a file that cannot be read, or is larger than a scenario may be.
-std::string read_config_file(const std::filesystem::path& file, const std::string& kind);
+/// @throws ConfigError for a file that is empty, cannot be read, or has more than `most` bytes.
+std::string read_config_file(const std::filesystem::path& file, const std::string& kind,
+                             std::size_t most = kMaxScenarioBytes);
 
 /// The scenario in `root`, the tree of a file with this text; checked as load_scenario does.
 Scenario read_scenario(const YamlNode& root, const std::string& place, const std::string& text,

@@ -10,6 +10,8 @@
 #include <sstream>
 #include <utility>
 
+#include "common/text/printable.hpp"
+
 namespace sls::config {
 namespace {
 
@@ -99,28 +101,6 @@ class TreeBuilder : public YAML::EventHandler {
   std::optional<YamlNode> root_;
 };
 
-/// Length of the well-formed UTF-8 sequence at `at`, or 0. Source: Unicode 15, table 3-7.
-std::size_t calc_utf8_length(const std::string& text, std::size_t at) {
-  const auto byte = [&](std::size_t i) {
-    return at + i < text.size() ? static_cast<unsigned char>(text[at + i]) : 0u;
-  };
-  const auto continues = [&](std::size_t i) { return (byte(i) & 0xC0u) == 0x80u; };
-  const unsigned first = byte(0);
-  if (first < 0x80) return 1;
-  if (first >= 0xC2 && first <= 0xDF) return continues(1) ? 2 : 0;
-  if (first >= 0xE0 && first <= 0xEF) {
-    const bool overlong = first == 0xE0 && byte(1) < 0xA0;
-    const bool surrogate = first == 0xED && byte(1) > 0x9F;
-    return continues(1) && continues(2) && !overlong && !surrogate ? 3 : 0;
-  }
-  if (first >= 0xF0 && first <= 0xF4) {
-    const bool overlong = first == 0xF0 && byte(1) < 0x90;
-    const bool beyond = first == 0xF4 && byte(1) > 0x8F;
-    return continues(1) && continues(2) && continues(3) && !overlong && !beyond ? 4 : 0;
-  }
-  return 0;
-}
-
 bool is_control(unsigned char c) {
   return (c < 0x20 && c != '\t' && c != '\n' && c != '\r') || c == 0x7F;
 }
@@ -132,7 +112,7 @@ std::string to_hex(unsigned char byte) {
 
 void check_is_text(const std::string& text, const std::string& place) {
   for (std::size_t at = 0; at < text.size();) {
-    const std::size_t length = calc_utf8_length(text, at);
+    const std::size_t length = text::calc_utf8_length(text, at);
     const auto byte = static_cast<unsigned char>(text[at]);
     if (length == 0 || is_control(byte)) {
       const auto position = text.begin() + static_cast<std::ptrdiff_t>(at);
@@ -190,7 +170,7 @@ YamlNode parse_yaml(const std::string& text, const std::string& place) {
 bool is_utf8(const std::string& text) {
   std::size_t at = 0;
   while (at < text.size()) {
-    const std::size_t length = calc_utf8_length(text, at);
+    const std::size_t length = text::calc_utf8_length(text, at);
     if (length == 0) return false;
     at += length;
   }

@@ -1,5 +1,6 @@
 #include <errno.h>  // program_invocation_short_name
 #include <signal.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -9,7 +10,10 @@
 #include <chrono>
 #include <csignal>
 #include <cstring>
+#include <filesystem>
+#include <fstream>
 #include <mutex>
+#include <optional>
 #include <string_view>
 #include <thread>
 #include <vector>
@@ -26,6 +30,36 @@ constexpr auto kReportAfter = 2s;
 
 std::atomic<double> patience_s{60.0};
 
+const locale_t kCLocale = ::newlocale(LC_ALL_MASK, "C", nullptr);
+
+/// Where the process makes files, and with which rights.
+struct FileState {
+  struct stat folder {};
+  std::string path;  // of the folder; another process may rename it
+  mode_t mask = 0;
+};
+
+FileState look_at_files() {
+  FileState state;
+  ::stat(".", &state.folder);
+  std::error_code ignored;
+  state.path = std::filesystem::current_path(ignored).string();
+  std::ifstream status("/proc/self/status");  // umask() would set it, for all threads
+  for (std::string word; status >> word;)
+    if (word == "Umask:") status >> std::oct >> state.mask;
+  return state;
+}
+
+/// Puts `before` back and returns what was changed, or "".
+std::string put_back_files(const FileState& before) {
+  const FileState now = look_at_files();
+  if (now.mask != before.mask) ::umask(before.mask);
+  if (now.folder.st_dev == before.folder.st_dev && now.folder.st_ino == before.folder.st_ino)
+    return now.mask == before.mask ? "" : "changed the umask of the process";
+  [[maybe_unused]] const int failed = ::chdir(before.path.c_str());
+  return "changed the working folder of the process";
+}
+
 /// State of one thread. `calls` is odd while the thread is inside a library. The watchdog reads it
 /// without a lock.
 struct ThreadRecord {
@@ -33,8 +67,10 @@ struct ThreadRecord {
   Call call;
   sigjmp_buf place;
   bool has_place = false;
-  int crash = 0;                         // the signal
-  std::array<char, 16384> signal_stack;  // a stack overflow leaves no room on the thread's own
+  std::uint64_t calls_in_flight = 0;
+  std::optional<FileState> files;                    // before the calls since the last look
+  int crash = 0;                                     // the signal
+  alignas(16) std::array<char, 16384> signal_stack;  // a stack overflow leaves no room on its own
 };
 
 /// A line of text, built without allocation because signal handlers use it.
@@ -96,6 +132,8 @@ Line describe_crash(const ThreadRecord& record, int number) {
       .add(")");
 }
 
+struct sigaction earlier_bus {};  // what SIGBUS did outside of libraries
+
 void report_crash(int number) {
   if (is_inside_library(current)) {
     // Out of the handler, so that the last words may allocate: CallGuard::after_crash.
@@ -108,6 +146,7 @@ void report_crash(int number) {
   // SA_RESETHAND has restored the default action, so the second signal ends the process. abort()
   // itself raises SIGABRT again.
   if (number == SIGABRT) return;
+  if (number == SIGBUS) ::sigaction(number, &earlier_bus, nullptr);
   ::raise(number);
 }
 
@@ -145,7 +184,7 @@ class Watchdog {
     action.sa_handler = &report_crash;
     action.sa_flags = static_cast<int>(SA_RESETHAND | SA_ONSTACK);
     for (const int number : {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT})
-      ::sigaction(number, &action, nullptr);
+      ::sigaction(number, &action, number == SIGBUS ? &earlier_bus : nullptr);
     std::thread([this] { watch(); }).detach();
   }
 
@@ -220,10 +259,36 @@ void set_patience(double seconds) { patience_s = seconds; }
 
 void warn(const char* message) { Line().begin("warning").add(message).add("\n").write_to_stderr(); }
 
-CallGuard::CallGuard(const Call& call) {
+CallGuard::CallGuard(const Call& call, bool is_in_flight)
+    : is_in_flight_(is_in_flight),
+      floating_point_mode_(floating_point_mode()),
+      process_locale_(::setlocale(LC_ALL, nullptr)),
+      thread_locale_(::uselocale(kCLocale)) {
   thread_local Registration registration;
-  registration.record.call = call;
-  registration.record.calls.fetch_add(1, std::memory_order_release);
+  ThreadRecord& record = registration.record;
+  const std::uint64_t number = is_in_flight ? ++record.calls_in_flight : 0;
+  looks_at_files_ = number % 4096 == 0 || (number < 4096 && (number & (number - 1)) == 0);
+  if (!record.files || (looks_at_files_ && expects_changes_between_calls))
+    record.files = look_at_files();
+  record.call = call;
+  record.calls.fetch_add(1, std::memory_order_release);
+}
+
+std::string CallGuard::put_back() {
+  std::string change;
+  if (floating_point_mode() != floating_point_mode_) {
+    restore_floating_point_mode(floating_point_mode_);
+    change = "changed the floating-point mode of the thread (rounding, flush to zero or traps)";
+  }
+  if (::uselocale(thread_locale_) != kCLocale) change = "changed the locale of the thread";
+  if (process_locale_ != ::setlocale(LC_ALL, nullptr) || streams_locale_ != std::locale()) {
+    std::locale::global(streams_locale_);
+    ::setlocale(LC_ALL, process_locale_.c_str());
+    change = "changed the locale of the process";
+  }
+  const std::string files = looks_at_files_ ? put_back_files(*current->files) : "";
+  if (files.empty()) return change;
+  return files + (is_in_flight_ ? " in this or an earlier call" : "");
 }
 
 CallGuard::~CallGuard() {

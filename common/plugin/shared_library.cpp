@@ -140,17 +140,16 @@ void SharedLibrary::load(const std::string& path) {
   if (const unsigned machine = read_machine(path); machine != kOwnMachine)
     fail("expected a shared library for " + to_name(kOwnMachine) + ", got one for " +
          to_name(machine));
-  const std::uint64_t mode = floating_point_mode();
+  std::string change;
   {
-    const CallGuard guard({name_.c_str(), "(loading)", 0, 0});
+    CallGuard guard({name_.c_str(), "(loading)", 0, 0}, false);
     handle_ = ::dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+    change = guard.put_back();
   }
-  if (floating_point_mode() != mode) {
-    restore_floating_point_mode(mode);
+  if (!change.empty()) {
     if (handle_) ::dlclose(handle_);
-    fail(
-        "changes the floating-point mode of the whole process when it is loaded; link it without "
-        "-ffast-math");
+    const bool is_fast_math = change.find("floating-point") != change.npos;
+    fail(change + " when it was loaded" + (is_fast_math ? "; link it without -ffast-math" : ""));
   }
   if (handle_) return;
   const std::string error = ::dlerror();

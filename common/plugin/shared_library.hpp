@@ -2,11 +2,15 @@
 /// library, function, vehicle and step.
 #pragma once
 
+#include <locale.h>
+
+#include <atomic>
 #include <csetjmp>
 #include <cstdint>
 #include <exception>
 #include <filesystem>
 #include <functional>
+#include <locale>
 #include <stdexcept>
 #include <string>
 
@@ -29,7 +33,8 @@ struct Call {
 /// exit code 1. Times when the process is stopped (SIGSTOP) do not count.
 class CallGuard {
  public:
-  explicit CallGuard(const Call& call);
+  /// From here to `put_back`, the thread has the C locale, whatever that of the process.
+  CallGuard(const Call& call, bool is_in_flight);
   ~CallGuard();
   CallGuard(const CallGuard&) = delete;
   CallGuard& operator=(const CallGuard&) = delete;
@@ -37,7 +42,23 @@ class CallGuard {
   /// Where a crash continues if there are LastWords: set it by sigsetjmp, then call after_crash.
   sigjmp_buf& place();
   [[noreturn]] void after_crash();
+
+  /// Restores floating-point mode, locale, working folder and umask; returns what was changed, or
+  /// "". In flight it looks at folder and umask (20 µs) in the calls of a thread that README.md
+  /// lists.
+  std::string put_back();
+
+ private:
+  const bool is_in_flight_;
+  bool looks_at_files_ = false;
+  const std::uint64_t floating_point_mode_;
+  const std::string process_locale_;
+  const std::locale streams_locale_;
+  const locale_t thread_locale_;
 };
+
+/// True if other code, such as Python, may change working folder or umask between two calls.
+inline std::atomic<bool> expects_changes_between_calls{false};
 
 /// While the object exists, a crash or an exit inside a library calls `call` with the event
 /// before the process ends: a recording closes its files. At most one exists.
@@ -60,14 +81,12 @@ void restore_floating_point_mode(std::uint64_t mode);
 void warn(const char* message);
 
 /// Calls `work` inside a library.
-/// @throws std::runtime_error if the call throws, or changes the floating-point mode (which is then
-///   restored).
+/// @throws std::runtime_error if the call throws, or changes what CallGuard::put_back restores.
 template <class Work>
-void call_guarded(const Call& call, const Work& work) {
-  const std::uint64_t mode = floating_point_mode();
-  std::string defect;
+void call_guarded(const Call& call, const Work& work, bool is_in_flight = true) {
+  std::string defect, change;
   {
-    CallGuard guard(call);
+    CallGuard guard(call, is_in_flight);
     if (sigsetjmp(guard.place(), 0) != 0) guard.after_crash();
     try {
       work();
@@ -76,12 +95,9 @@ void call_guarded(const Call& call, const Work& work) {
     } catch (...) {
       defect = "threw an exception";
     }
+    change = guard.put_back();
   }
-  if (floating_point_mode() != mode) {
-    restore_floating_point_mode(mode);
-    if (defect.empty())
-      defect = "changed the floating-point mode of the thread (rounding, flush to zero or traps)";
-  }
+  if (defect.empty()) defect = change;
   if (!defect.empty()) throw std::runtime_error(call.describe() + ": " + defect);
 }
 
@@ -89,7 +105,7 @@ void call_guarded(const Call& call, const Work& work) {
 template <class Work>
 void call_at_end(const Call& call, const Work& work) noexcept {
   try {
-    call_guarded(call, work);
+    call_guarded(call, work, false);
   } catch (const std::exception& error) {
     warn(error.what());
   }
@@ -106,8 +122,8 @@ class SharedLibrary {
  public:
   /// Loads `file`, which stays loaded: later objects of the same path use it again. `place` is
   /// FILE:LINE: KEY of the scenario, for messages.
-  /// @throws config::ConfigError if the file is missing, cannot be loaded, or changes itself or the
-  ///   floating-point mode while loading.
+  /// @throws config::ConfigError if the file is missing, cannot be loaded, or changes itself or
+  ///   what CallGuard::put_back restores while loading.
   SharedLibrary(const std::filesystem::path& file, const std::string& place);
 
   /// Address of `symbol`. @throws config::ConfigError if there is none.
@@ -117,7 +133,7 @@ class SharedLibrary {
   template <class Work>
   void call(const Call& call, const Work& work) const {
     try {
-      call_guarded(call, work);
+      call_guarded(call, work, false);
     } catch (const std::exception& error) {
       fail_at_place(error.what());
     }

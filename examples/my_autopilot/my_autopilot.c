@@ -1,5 +1,7 @@
 /* Your own autopilot: a proportional-derivative law on the attitude's quaternion, and the
  * shares of four rotors in an X. The equations are in README.md. */
+#define _GNU_SOURCE /* strtod_l */
+#include <locale.h>
 #include <math.h>
 #include <sls/sls_autopilot.h>
 #include <stdio.h>
@@ -21,6 +23,7 @@ typedef struct {
 /* Reads {"attitude_1_s2": 900, …} into `k`. Returns 0 and writes `error` if it cannot. */
 static int read_parameters(const char* json, double* k, char* error, size_t error_size) {
   char* end;
+  locale_t c = newlocale(LC_ALL_MASK, "C", NULL); /* the process may have a decimal comma */
   for (const char* at = strchr(json, '"'); at; at = strchr(end, '"')) {
     const char* name = at + 1;
     const int length = (int)strcspn(name, "\"");
@@ -31,7 +34,7 @@ static int read_parameters(const char* json, double* k, char* error, size_t erro
       snprintf(error, error_size, "expected attitude_1_s2 or rate_1_s, got %.*s", length, name);
       return 0;
     }
-    k[i] = strtod(value, &end);
+    k[i] = strtod_l(value, &end, c);
     if (end == value || !(k[i] > 0.0)) {
       snprintf(error, error_size, "%s: expected a number > 0, got %.*s", kNames[i],
                (int)strcspn(value, ",}"), value);

@@ -1,6 +1,8 @@
 /* Your own controller, a cascade: the position error gives a desired velocity, its error a desired
  * acceleration, and that a desired slope of the rod. Its memory travels as numbers: see README.md.
  */
+#define _GNU_SOURCE /* strtod_l */
+#include <locale.h>
 #include <sls/sls_controller.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,6 +24,7 @@ typedef struct {
 /* Reads {"velocity": 2.5, …} into `k`. Returns 0 and writes `error` if it cannot. */
 static int read_parameters(const char* json, double* k, char* error, size_t error_size) {
   char* end;
+  locale_t c = newlocale(LC_ALL_MASK, "C", NULL); /* the process may have a decimal comma */
   for (const char* at = strchr(json, '"'); at; at = strchr(end, '"')) {
     const char* name = at + 1;
     const int length = (int)strcspn(name, "\"");
@@ -34,7 +37,7 @@ static int read_parameters(const char* json, double* k, char* error, size_t erro
                length, name);
       return 0;
     }
-    k[i] = strtod(value, &end);
+    k[i] = strtod_l(value, &end, c);
     if (end == value || !(k[i] >= 0.0)) {
       snprintf(error, error_size, "%s: expected a number >= 0, got %.*s", kNames[i],
                (int)strcspn(value, ",}"), value);

@@ -1,5 +1,7 @@
 /* Your own plant: quadrotor and load are two point masses, joined by an elastic rope instead of a
  * rod. It publishes one signal, the stretch of the rope. */
+#define _GNU_SOURCE /* strtod_l */
+#include <locale.h>
 #include <math.h>
 #include <sls/sls_plant.h>
 #include <stdio.h>
@@ -24,6 +26,7 @@ typedef struct {
 /* Reads {"stiffness_n_m": 2000, …} into `k`. Returns 0 and writes `error` if it cannot. */
 static int read_parameters(const char* json, double* k, char* error, size_t error_size) {
   char* end;
+  locale_t c = newlocale(LC_ALL_MASK, "C", NULL); /* the process may have a decimal comma */
   for (const char* at = strchr(json, '"'); at; at = strchr(end, '"')) {
     const char* name = at + 1;
     const int length = (int)strcspn(name, "\"");
@@ -35,7 +38,7 @@ static int read_parameters(const char* json, double* k, char* error, size_t erro
                name);
       return 0;
     }
-    k[i] = strtod(value, &end);
+    k[i] = strtod_l(value, &end, c);
     if (end == value || !(k[i] > 0.0)) {
       snprintf(error, error_size, "%s: expected a number > 0, got %.*s", kNames[i],
                (int)strcspn(value, ",}"), value);

@@ -7,6 +7,7 @@
 
 #include "common/app/run_main.hpp"
 #include "common/config/config_error.hpp"
+#include "common/text/printable.hpp"
 #include "recorder/sinks/csv/csv_reader.hpp"
 
 namespace sls::python {
@@ -22,18 +23,23 @@ void raise_os_error(const std::system_error& error) {
   PyErr_SetObject(PyExc_OSError, raised.ptr());
 }
 
+/// Controls in the text, which may quote a file, are escaped.
+void set_error(const char* name, const std::exception& error) {
+  PyErr_SetString(find_error_type(name).ptr(), text::escape_controls(error.what()).c_str());
+}
+
 void translate(std::exception_ptr thrown) {
   if (!thrown) return;
   try {
     std::rethrow_exception(thrown);
   } catch (const config::ConfigError& error) {
-    PyErr_SetString(find_error_type("ConfigError").ptr(), error.what());
+    set_error("ConfigError", error);
   } catch (const std::system_error& error) {
     raise_os_error(error);
   } catch (const app::RunError& error) {
-    PyErr_SetString(find_error_type("RunError").ptr(), error.what());
+    set_error("RunError", error);
   } catch (const record::DamagedError& error) {
-    PyErr_SetString(find_error_type("RunError").ptr(), error.what());
+    set_error("RunError", error);
   }
 }
 

@@ -3,12 +3,17 @@
 
 #include <algorithm>
 #include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
 
 #include "common/config/config_error.hpp"
+#include "common/config/yaml_node.hpp"
 #include "control_client/laws/qsf/lqr.hpp"
 #include "python/bindings/bindings.hpp"
 #include "recorder/recording_reader.hpp"
@@ -46,7 +51,7 @@ py::tuple compare(const std::string& folder_a, const std::string& folder_b) {
 
 /// A column of numbers, or of texts as indices into `texts`.
 struct TableColumn {
-  bool is_text = false;
+  bool is_text = false, is_wanted = true;
   std::vector<double> numbers;
   std::vector<std::string> texts;
   std::vector<std::int64_t> indices;
@@ -68,38 +73,64 @@ struct TableColumn {
   }
 };
 
+/// An array that takes over the numbers.
 template <class Number>
-py::array_t<Number> to_array(const std::vector<Number>& numbers) {
-  return py::array_t<Number>(static_cast<py::ssize_t>(numbers.size()), numbers.data());
+py::array_t<Number> to_array(std::vector<Number>& numbers) {
+  auto* owned = new std::vector<Number>(std::move(numbers));
+  const py::capsule owner(owned, [](void* it) { delete static_cast<std::vector<Number>*>(it); });
+  return py::array_t<Number>(static_cast<py::ssize_t>(owned->size()), owned->data(), owner);
+}
+
+std::size_t count_lines(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  return static_cast<std::size_t>(
+      std::count(std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>(), '\n'));
 }
 
 /// The columns of a CSV file whose first line is `header`: arrays (rows,) of float64, and for the
 /// columns `text` a tuple of the different texts and an index for each row. A last row without a
-/// line break is left out.
+/// line break is left out. Columns that are not among `wanted` are not read: None.
 /// @throws config::ConfigError with file and line for a row that cannot be read.
 py::list read_table(const std::string& path, const std::string& header,
-                    const std::set<std::string>& text) {
+                    const std::set<std::string>& text,
+                    const std::optional<std::set<std::string>>& wanted) {
   std::vector<TableColumn> columns;
   try {
     record::CsvReader file(path, header);
     columns.resize(file.columns().size());
-    for (std::size_t i = 0; i < columns.size(); ++i)
+    std::vector<std::size_t> read;
+    // A row has a byte for each column at least.
+    const std::size_t lines =
+        std::min<std::size_t>(count_lines(path), std::filesystem::file_size(path) / columns.size());
+    for (std::size_t i = 0; i < columns.size(); ++i) {
       columns[i].is_text = text.count(file.columns()[i]) > 0;
+      columns[i].is_wanted = !wanted || wanted->count(file.columns()[i]) > 0;
+      if (!columns[i].is_wanted) continue;
+      read.push_back(i);
+      columns[i].is_text ? columns[i].indices.reserve(lines) : columns[i].numbers.reserve(lines);
+    }
     while (file.next())
-      for (std::size_t i = 0; i < columns.size(); ++i) {
+      for (const std::size_t i : read) {
         const std::string_view field = file.fields()[i];
+        if (columns[i].is_text && !config::is_utf8(std::string(field)))
+          throw config::ConfigError(file.place() + file.columns()[i] +
+                                    ": expected UTF-8 text, got '" +
+                                    config::to_printable(std::string(field)) + "'");
         if (columns[i].is_text)
           columns[i].add_text(field);
         else if (!columns[i].add_number(field))
           throw config::ConfigError(file.place() + file.columns()[i] +
-                                    ": expected a number, got '" + std::string(field) + "'");
+                                    ": expected a number, got '" +
+                                    config::to_printable(std::string(field)) + "'");
       }
   } catch (const record::DamagedError& error) {
     throw config::ConfigError(error.what());
   }
   py::list result;
-  for (const TableColumn& column : columns)
-    if (column.is_text)
+  for (TableColumn& column : columns)
+    if (!column.is_wanted)
+      result.append(py::none());
+    else if (column.is_text)
       result.append(py::make_tuple(column.texts, to_array(column.indices)));
     else
       result.append(to_array(column.numbers));
@@ -131,7 +162,8 @@ py::dict calc_lqr(double horizontal, double vertical) {
 void add_recording(py::module_& module) {
   module.def("inspect_recording", &inspect, py::arg("folder"));
   module.def("compare_recordings", &compare, py::arg("a"), py::arg("b"));
-  module.def("read_table", &read_table, py::arg("path"), py::arg("header"), py::arg("text"));
+  module.def("read_table", &read_table, py::arg("path"), py::arg("header"), py::arg("text"),
+             py::arg("wanted") = py::none());
   module.def("lqr", &calc_lqr, py::arg("horizontal"), py::arg("vertical"));
 }
 

@@ -55,7 +55,7 @@ def plot(options: argparse.Namespace) -> None:
         recording = Recording(source)
         flights.append(load_recording(recording, name, options.vehicle))
         if len(names) == 1:
-            fleet = recording.load_fleet()
+            fleet = recording.load_fleet() if len(recording.vehicle_ids) > 1 else []
             out = options.out or source / "figures"
     figures = make_figures(flights, fleet, options.paper, dict(options.panels) if options.panels else None)
     if not figures:
@@ -93,6 +93,8 @@ def report(options: argparse.Namespace) -> None:
     from sls.report import make_report
     page = make_report(Recording(options.recording), options.vehicle)
     file = options.recording / "report.html"
+    if file.exists() and not file.is_file():  # a pipe would wait for a reader
+        raise InputError(f"{file}: expected a file or none, got another kind")
     try:
         file.write_text(page, encoding="utf-8", errors="replace")
     except OSError as error:

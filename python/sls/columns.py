@@ -37,3 +37,10 @@ class Columns(Mapping[str, np.ndarray]):
     def stack(self, names: Sequence[str]) -> np.ndarray:
         """A copy of the columns `names`, side by side, (rows, len(names))."""
         return np.column_stack([self[name] for name in names])
+
+    def take(self, names: Sequence[str]) -> np.ndarray:
+        """As `stack`; the mapping gives these columns up, and so their memory."""
+        values = self.stack(names)
+        for name in names:
+            del self._columns[name]
+        return values

@@ -3,8 +3,10 @@
 import csv
 import io
 import os
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +15,14 @@ import numpy as np
 from sls.core import load_core, to_core
 from sls.errors import ConfigError
 from sls.input_error import InputError
+from sls.strict_files import open_regular, read_limited
 
 TEXT_COLUMNS = {"stage_name", "fault", "controller"}
 INTEGER_COLUMNS = {"vehicle_id", "step", "stage"}
+MOST_LINE = 200_000
+WHOLE, FRACTION, TEXT = (re.compile(pattern, re.DOTALL) for pattern in ("[0-9]{1,18}", r"[-+0-9.einfa]{1,30}", ".*"))
+STATUS = dict.fromkeys(("phase", "reason", "controller", "timing", "problem"), TEXT) | dict.fromkeys(
+    ("real_time_factor", "round_trip_p50_us", "round_trip_p99_us"), FRACTION)  # the other columns are whole numbers
 
 
 @dataclass(frozen=True)
@@ -28,12 +35,12 @@ class Text:
     """Text after the last line end. In a recording this is a row whose writer was killed."""
 
 
-def read_text(path: Path) -> Text:
-    """Reads the text file `path`. Raises InputError if it cannot be read as text."""
+def read_text(path: Path, most: int = 500_000_000) -> Text:
+    """Reads the text file `path` of at most `most` bytes. Raises InputError if it cannot be read as text."""
     try:
-        text = path.read_bytes().decode()
+        text = read_limited(path, most).decode()
     except OSError as error:
-        raise InputError(f"{path}: expected a file, got: {os.strerror(error.errno)}") from None
+        raise InputError(f"{path}: expected a file, got: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: expected text, got byte {error.object[error.start]:#04x} at "
                          f"{error.start}") from None
@@ -80,16 +87,21 @@ def is_number(text: str) -> bool:
     return True
 
 
-def read_table(path: Path, required: Sequence[str]) -> tuple[dict[str, np.ndarray], bool]:
-    """The columns of a CSV file with a header, and whether its last row was cut off. Numbers are float64, those of
-    INTEGER_COLUMNS int64. The header must have the columns `required`. Raises InputError."""
+def read_header(path: Path) -> tuple[str, bool]:
+    """The first line of a file, and whether its last line was cut off. Raises InputError."""
     try:
-        with path.open("rb") as file:
-            header = file.readline().decode(errors="replace")
+        with open_regular(path) as file:
+            header = file.readline(MOST_LINE).decode(errors="replace")
             file.seek(-1 if header else 0, os.SEEK_END)
-            is_cut = file.read() not in (b"\n", b"")
+            return header, file.read() not in (b"\n", b"")
     except OSError as error:
-        raise InputError(f"{path}: expected a file, got: {os.strerror(error.errno)}") from None
+        raise InputError(f"{path}: expected a file, got: {error.strerror}") from None
+
+
+def read_table(path: Path, required: Sequence[str], wanted: str = ".*") -> dict[str, np.ndarray]:
+    """The columns of a CSV file with a header whose names match `wanted`. Numbers are float64, those of INTEGER_COLUMNS
+    int64. The header must have the columns `required`. Raises InputError."""
+    header, _ = read_header(path)
     if not header.endswith("\n"):
         raise InputError(f"{path}:1: expected a header, got an empty file")
     names = header[:-1].split(",")
@@ -97,10 +109,15 @@ def read_table(path: Path, required: Sequence[str]) -> tuple[dict[str, np.ndarra
         if name not in names:
             raise InputError(f"{path}:1: expected a column '{name}', got '{header[:60].rstrip()}'")
     try:
-        columns = load_core().read_table(to_core(path), header[:-1], TEXT_COLUMNS)
+        read = {name for name in names if re.fullmatch(wanted, name)}
+        columns = load_core().read_table(to_core(path), header[:-1], TEXT_COLUMNS, read)
     except ConfigError as error:
         raise InputError(str(error)) from None
-    return {name: to_array(name, column) for name, column in zip(names, columns)}, is_cut
+    table = {name: column for name, column in zip(names, columns) if name in read}
+    for name, column in table.items():
+        if name in INTEGER_COLUMNS and not np.all(is_whole := (np.abs(column) < 2**53) & (column % 1 == 0)):
+            raise InputError(f"{path}: {name}: expected whole numbers, got {column[np.argmin(is_whole)]:g}")
+    return {name: to_array(name, column) for name, column in table.items()}
 
 
 def to_array(name: str, column: Any) -> np.ndarray:
@@ -110,7 +127,21 @@ def to_array(name: str, column: Any) -> np.ndarray:
     return column.astype(np.int64) if name in INTEGER_COLUMNS else column
 
 
-def read_records(path: Path) -> list[dict[str, str]]:
-    """The rows of a small CSV file. Its fields may be any text. Raises InputError."""
-    text = read_text(path)
-    return list(csv.DictReader(io.StringIO("\n".join(text.lines))))
+def read_records(path: Path) -> Iterator[dict[str, str]]:
+    """The rows of a status.csv, without one that is cut off. Raises InputError."""
+    try:
+        with io.TextIOWrapper(open_regular(path), "utf-8", newline="\n") as stream:
+            lines = iter(partial(stream.readline, MOST_LINE), "")
+            reader = csv.DictReader(line for line in lines if line.endswith("\n") or len(line) == MOST_LINE)
+            for row in reader:
+                for name in {"phase", "reason", "step", *row}:
+                    text = row.get(name)
+                    kind = STATUS.get(name, WHOLE)
+                    if not isinstance(text, str) or not kind.fullmatch(text):
+                        expected = "a text" if kind is TEXT else "a number"
+                        raise InputError(f"{path}:{reader.line_num}: {name}: expected {expected}, got {text!r:.60}")
+                yield row
+    except OSError as error:
+        raise InputError(f"{path}: expected a file, got: {error.strerror}") from None
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"{path}: expected rows of text, got: {error}") from None

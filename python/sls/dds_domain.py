@@ -1,5 +1,6 @@
 """DDS domains for flights that no other program may disturb."""
 
+import re
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -14,7 +15,7 @@ DOMAINS = range(100, 161)
 def own_domain() -> Iterator[int]:
     """Context with a DDS domain that no other campaign or check on this machine uses. An abstract socket with the
     domain's number marks it as used; the socket disappears with its process. Afterwards the domain's ports in shared
-    memory are removed, which processes that were killed leave behind."""
+    memory, whose numbers end with those of UDP (common/bus/fastdds/host_id.hpp), are removed, which processes that were killed leave behind."""
     for number in DOMAINS:
         lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
@@ -25,11 +26,12 @@ def own_domain() -> Iterator[int]:
         try:
             yield number
         finally:
-            for port in range(7400 + 250 * number, 7400 + 250 * (number + 1)):
-                for name in (f"fastrtps_port{port}", f"fastdds_port{port}"):  # of Fast DDS 2 and 3
-                    for file in (name, f"{name}_el", f"{name}_sl", f"sem.{name}_mutex"):
-                        with suppress(OSError):  # none there, or read-only: the programs say what they need
-                            Path("/dev/shm", file).unlink()
+            # None there, or read-only: the programs say what they need.
+            for file in Path("/dev/shm").glob("*fast*_port*"):
+                port = re.match(r"(?:sem\.)?fast(?:rtps|dds)_port(\d+)", file.name)
+                if port and 0 <= (int(port[1]) & 0xFFFF) - 7400 - 250 * number < 250:
+                    with suppress(OSError):
+                        file.unlink()
             lock.close()
         return
     raise RunError(f"expected a free DDS domain from {DOMAINS[0]} to {DOMAINS[-1]}, got none")

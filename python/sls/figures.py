@@ -40,8 +40,8 @@ METADATA = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None},
             "pdf": {"CreationDate": None, "Creator": None, "Producer": None}}
 
 
-# Most points of all vehicles together. More points would only make the file larger.
-FLEET_POINTS = 100_000
+# Most points of all vehicles together, and about the most of a line. More points would only make the file larger.
+FLEET_POINTS, LINE_POINTS = 100_000, 40_000
 
 
 def to_z_up(positions: np.ndarray) -> np.ndarray:
@@ -67,6 +67,8 @@ def break_at_gaps(time_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, n
         return time_s, values
     spacing = np.diff(time_s)
     gaps = np.flatnonzero(spacing > 1.5 * np.median(spacing)) + 1
+    if not len(gaps):
+        return time_s, values
     return np.insert(time_s, gaps, np.nan), np.insert(values, gaps, np.nan, axis=0)
 
 
@@ -79,11 +81,31 @@ def break_at_jumps(positions: np.ndarray) -> np.ndarray:
 def find_set_points(positions: np.ndarray) -> np.ndarray:
     """The positions at which a reference rests, each once."""
     stays = np.all(positions[1:] == positions[:-1], axis=1)
-    return np.unique(positions[1:][stays], axis=0)
+    begins = np.flatnonzero(np.diff(stays, prepend=False) & stays) + 1
+    return np.unique(positions[begins], axis=0)
+
+
+def find_rows(values: np.ndarray) -> np.ndarray:
+    """The rows of `values` (n, k) that a line needs to look the same: of many equal spans the first row, those of the
+    extremes of each column, and one without a value."""
+    count, columns = values.shape
+    size = -(-count * (2 * columns + 2) // LINE_POINTS)
+    if size <= 2 * columns + 2:
+        return np.arange(count)
+    first = np.arange(0, count, size)
+    rows = [first, [count - 1]]
+    for column in values.T:
+        spans = np.append(column, np.full(-count % size, column[-1])).reshape(-1, size)
+        is_missing = np.isnan(spans)
+        rows += [first + np.argmax(is_missing, axis=1), first + np.argmin(np.where(is_missing, np.inf, spans), axis=1),
+                 first + np.argmax(np.where(is_missing, -np.inf, spans), axis=1)]
+    return np.unique(np.minimum(np.concatenate(rows), count - 1))
 
 
 def draw(axes: Axes, time_s: np.ndarray, values: np.ndarray, **style) -> None:
-    axes.plot(*break_at_gaps(time_s, values), **style)
+    time_s, values = break_at_gaps(time_s, values)
+    rows = find_rows(values[:, np.newaxis])
+    axes.plot(time_s[rows], values[rows], **style)
 
 
 def mark_stages(all_axes: Sequence[Axes], flights: Sequence[Trajectory]) -> None:
@@ -247,17 +269,18 @@ def plot_path(flights: Sequence[Trajectory]) -> Figure:
     axes = figure.add_subplot(projection="3d")
     drawn = []
     for index, flight in enumerate(flights):
-        drawn.append(to_z_up(flight.p_WL))
+        drawn.append(to_z_up(flight.p_WL[find_rows(flight.p_WL)]))
         style = style_of(index, flights)
         axes.plot(*drawn[-1].T, **style, label="load" if len(flights) == 1 else flight.name)
         axes.scatter(*drawn[-1][0], color=style["color"], s=18)
         if len(flights) == 1:
-            drawn.append(to_z_up(flight.p_WQ))
+            drawn.append(to_z_up(flight.p_WQ[find_rows(flight.p_WQ)]))
             axes.plot(*drawn[-1].T, color=QUAD, linewidth=0.8, label="quadrotor")
     for flight, label, colour in list_references(flights):
-        drawn.append(to_z_up(flight.p_WL_ref))
-        axes.plot(*break_at_jumps(drawn[-1]).T, color=colour, label=label, **REFERENCE)
-        axes.scatter(*find_set_points(drawn[-1]).T, color="#444444", marker="x", s=34,
+        path = break_at_jumps(flight.p_WL_ref)
+        drawn.append(to_z_up(path[find_rows(path)]))
+        axes.plot(*drawn[-1].T, color=colour, label=label, **REFERENCE)
+        axes.scatter(*find_set_points(to_z_up(flight.p_WL_ref)).T, color="#444444", marker="x", s=34,
                      linewidth=1.2)
     set_equal_scale(axes, np.concatenate(drawn))
     axes.set_xlabel("forward, x (m)", labelpad=8)

@@ -7,13 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-import yaml
 
 from sls.closed_loop import to_whole
 from sls.columns import Columns
 from sls.core import load_core
 from sls.errors import RunError
-from sls.scenario import load_scenario
+from sls.scenario import load_scenario, read_keys
 from sls.trajectory import Stage, Trajectory, find_stages, read_body, read_cable
 from sls.vehicle_columns import VehicleColumns
 
@@ -124,8 +123,8 @@ class FlownVehicle(VehicleColumns):
             time_s=self.time_s, p_WQ=self.quad_position, p_WL=self.load_position,
             p_WL_ref=self.reference_position, alpha=self.alpha, beta=self.beta,
             f_Q_W=self.force, stages=self._find_stages(), period_s=self.scenario.period_s,
-            body=read_body(self.state),
-            cable=read_cable(self.state, lambda: yaml.safe_load(self.scenario.text), self.vehicle_id))
+            body=read_body(Columns({name: self.state[name] for name in self.state})),
+            cable=read_cable(self.state, lambda: read_keys(self.scenario), self.vehicle_id))
 
     def _find_stages(self) -> tuple[Stage, ...]:
         plans = [(for_s, lap_s) for _, _, for_s, lap_s in self.scenario.stages]

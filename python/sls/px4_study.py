@@ -24,10 +24,8 @@ from sls.errors import RunError
 from sls.input_error import InputError
 from sls.metrics import StageMetrics, calc_over, split_laps
 from sls.recordings import Recording
+from sls.scenario import ROOT, SHIPPED
 from sls.tables import format_error, list_error_cells, make_markdown_table
-
-ROOT = Path(__file__).resolve().parents[2]
-SCENARIOS = ROOT / "config/scenarios"
 
 Change = Callable[[dict[str, Any]], None]
 
@@ -167,13 +165,13 @@ class RunFailed(RunError):
 
 
 def load_base(name: str) -> dict[str, Any]:
-    return yaml.safe_load((SCENARIOS / f"{name}.yaml").read_text())
+    return yaml.safe_load((SHIPPED / f"{name}.yaml").read_text())
 
 
 def find_scenario(planned: Planned, recordings: Path) -> Path:
     """The scenario file: the shipped one, or, with changes, a new one below `recordings`."""
     if not planned.changes:
-        return SCENARIOS / f"{planned.base}.yaml"
+        return SHIPPED / f"{planned.base}.yaml"
     scenario = copy.deepcopy(load_base(planned.base))
     scenario["name"] = planned.name
     for change in planned.changes:
@@ -283,10 +281,10 @@ def shift_to_published(flight: Trajectory, base: str) -> Trajectory:
     return replace(flight, p_WL_ref=flight.p_WL_ref + shift)
 
 
-def measure(flight: Trajectory, label: str = "") -> StageMetrics:
+def measure(flight: Trajectory) -> StageMetrics:
     """Metrics of the second lap."""
     stage = next(stage for stage in flight.stages if stage.lap_s is not None)
-    return calc_over(flight, split_laps(flight, stage)[1].rows, label)
+    return calc_over(flight, split_laps(flight, stage)[1].rows, "")
 
 
 def make_chain(gains: str) -> HorizontalChain:
@@ -487,7 +485,7 @@ def make_margin_table(recordings: Path) -> str:
 
 def make_values(flown: dict[str, Flown], recordings: Path,
                 published: Sequence[str]) -> dict[str, str]:
-    """Values for the names in braces in this chapter of study_page.md."""
+    """The values of this chapter by the names of their markers."""
     def describe_limit(gains: str, lag_s: float) -> str:
         late = Lateness(lag_s=lag_s)
         return f"{calc_stability_limit(make_chain(gains), lag_s) - calc_hold(late):.3f}"

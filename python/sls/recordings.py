@@ -1,22 +1,24 @@
 """Reads recordings: complete, cut short, or in several segments."""
 
-import json
 import operator
 import os
+from collections import deque
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
+from sls.campaign.yaml_nodes import parse_yaml
 from sls.columns import Columns
 from sls.core import load_core, to_core
-from sls.csv_tables import read_records, read_table, read_text
+from sls.csv_tables import read_header, read_records, read_table, read_text
+from sls.strict_files import COUNT, check_shape, read_json
 from sls.trajectory import Stage, Trajectory, find_stages, read_body, read_cable
 from sls.vehicle_columns import VehicleColumns
 from sls.input_error import InputError
+from sls.launcher.place import escape_controls
 
 COLUMNS = {
     "state.csv": ("vehicle_id", "step", "sim_time_s", "quad_x_m", "quad_y_m", "quad_z_m",
@@ -24,6 +26,22 @@ COLUMNS = {
     "command.csv": ("vehicle_id", "step", "force_x_n", "force_y_n", "force_z_n", "fault"),
     "reference.csv": ("vehicle_id", "step", "stage", "stage_name", "ref_x_m", "ref_y_m", "ref_z_m"),
 }
+MOST_VEHICLES = 256
+MOST_SCENARIO_BYTES = 32768
+MANIFEST = {  # the keys that this package reads
+    "complete": bool, "outcome": str, "reason": str, "run_id": str, "scenario": str, "vehicle_ids": [range(2**32)],
+    "period_s": float, "mode": str, "missing": [{"vehicle_id": COUNT, "topic": str, "from": COUNT, "to": COUNT}],
+    "further_missing?": {"samples": COUNT}, "segment?": {"first_step": COUNT}, "last_step?": COUNT, "step_s?": float,
+    "stage_starts?": [{"vehicle_id": COUNT, "stage": COUNT, "step": COUNT}], "certificate?": str, "timing?": str,
+    "versions?": dict, "machine?": dict}
+SCENARIO = {
+    "mission": [{"for_s?": float, "figure_eight?": {"period_s": float}}], "vehicle?": {"load_mass_kg?": float},
+    "plant?": {"cables?": [{"attachment_m?": (float,) * 3}], "rotor?": dict, "rotors?": [dict]},
+    "controller?": {"model?": dict, "gains?": {"lqr?": dict}}}
+# Columns that figures and metrics need. Only they are read for these: a flight may have millions of steps.
+DRAWN = {"state.csv": r"sim_time_s|(quad|load)_[xyz]_m|(alpha|beta)_rad|(load_)?att_.*|rate_.*|rotor_.*|thrust_.*|rod_.*|"
+                      r"cable_.*", "command.csv": r"force_._n", "reference.csv": r"stage|ref_._m"}
+DRAWN["measured.csv"] = DRAWN["state.csv"]
 
 
 @dataclass(frozen=True)
@@ -34,20 +52,18 @@ class Event:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
+    """Raises InputError."""
     path = folder / "manifest.json"
     try:
-        manifest = json.loads(path.read_text())
+        manifest = read_json(path, MANIFEST)
     except OSError as error:
         raise InputError(f"{folder}: expected a recording, got no manifest.json that can be read "
-                         f"({os.strerror(error.errno)})") from None
-    except ValueError as error:
-        raise InputError(f"{path}: expected a manifest, got: {error}") from None
-    for key, kind in (("complete", bool), ("outcome", str), ("reason", str), ("run_id", str),
-                      ("scenario", str), ("vehicle_ids", list), ("period_s", float),
-                      ("mode", str), ("missing", list)):
-        value = manifest.get(key) if isinstance(manifest, dict) else None
-        if not isinstance(value, kind):
-            raise InputError(f"{path}: {key}: expected {kind.__name__}, got {json.dumps(value)}")
+                         f"({error.strerror})") from None
+    for key, is_held, expected in (
+            ("vehicle_ids", 0 < len(manifest["vehicle_ids"]) <= MOST_VEHICLES, f"1 to {MOST_VEHICLES} ids"),
+            ("period_s", 0 < manifest["period_s"] <= 1e6, "> 0 and <= 1000000")):
+        if not is_held:
+            raise InputError(f"{path}: {key}: expected {expected}, got {str(manifest[key]):.40}")
     return manifest
 
 
@@ -129,7 +145,7 @@ class Recording(VehicleColumns):
 
     def __init__(self, folder: str | os.PathLike[str]):
         self.folder = folder = Path(folder)
-        self._tables: dict[str, tuple[dict[str, np.ndarray], bool]] = {}
+        self._tables: dict[tuple[str, str], dict[str, np.ndarray]] = {}
         self._vehicles: dict[int, RecordedVehicle] = {}
         self.segments = [(folder, read_manifest(folder))]
         while (segment := folder / f"segment-{len(self.segments) + 1}").is_dir():
@@ -184,7 +200,7 @@ class Recording(VehicleColumns):
     def __repr__(self) -> str:
         manifest = self.manifest
         end = manifest["reason"] or manifest["outcome"] if manifest["complete"] else "incomplete"
-        return f"<sls.Recording {self.folder}: {manifest['scenario']}, {end}>"
+        return escape_controls(f"<sls.Recording {self.folder}: {manifest['scenario']}, {end}>")
 
     def verify(self) -> Verification:
         """Reads every file again, as `./sls verify DIR` does. Needs the extension module.
@@ -201,43 +217,40 @@ class Recording(VehicleColumns):
 
     @cached_property
     def scenario_text(self) -> str:
-        text = read_text(self.folder / "scenario.yaml")
+        text = read_text(self.folder / "scenario.yaml", MOST_SCENARIO_BYTES)
         return "\n".join([*text.lines, text.rest])
 
     @cached_property
     def scenario(self) -> dict[str, Any]:
         path = self.folder / "scenario.yaml"
-        try:
-            scenario = yaml.safe_load(self.scenario_text)
-        except yaml.YAMLError as error:
-            cause = " ".join(str(error).split())
-            raise InputError(f"{path}: expected YAML, got: {cause}") from None
-        if not isinstance(scenario, dict) or not isinstance(scenario.get("mission"), list):
-            raise InputError(f"{path}: expected a scenario with a mission, got another document")
+        scenario = parse_yaml(self.scenario_text.encode(), path).to_plain()
+        check_shape(path, scenario, SCENARIO)
         return scenario
 
-    def _load_table(self, name: str) -> tuple[dict[str, np.ndarray], bool]:
-        """The columns of a file from all segments, and whether a row was cut off. A segment ends at the
-        first step of the next segment. Each file is read once."""
-        if name in self._tables:
-            return self._tables[name]
-        parts, is_cut = [], False
+    def _load_table(self, name: str, drawn: str) -> dict[str, np.ndarray]:
+        """The columns of a file from all segments; with `drawn` those whose names match it. A segment ends at the
+        first step of the next segment. The file of a fleet, and one that is read whole, is read once."""
+        if (name, drawn) in self._tables:
+            return self._tables[name, drawn]
+        parts, wanted = [], f"vehicle_id|step|{drawn}" if drawn else ".*"
         for number, (folder, _) in enumerate(self.segments):
             columns = COLUMNS["state.csv" if name == "measured.csv" else name]
-            table, is_part_cut = read_table(folder / name, columns)
-            is_cut |= is_part_cut
+            table = read_table(folder / name, columns, wanted)
             if number + 1 < len(self.segments):
-                is_used = table["step"] < self.segments[number + 1][1]["segment"]["first_step"]
+                is_used = table["step"] < self.segments[number + 1][1].get("segment", {}).get("first_step", 0)
                 table = {column: values[is_used] for column, values in table.items()}
+            if parts and (missing := parts[0].keys() - table.keys()):
+                raise InputError(f"{folder / name}:1: expected a column '{min(missing)}', as in segment 1")
             parts.append(table)
         joined = parts[0] if len(parts) == 1 else {
             column: np.concatenate([part[column] for part in parts]) for column in parts[0]}
-        self._tables[name] = joined, is_cut
-        return joined, is_cut
+        if not drawn or len(self.vehicle_ids) > 1:
+            self._tables[name, drawn] = joined
+        return joined
 
-    def rows_of(self, name: str, vehicle_id: int) -> Columns:
-        """The rows of one vehicle in a file, from all segments."""
-        table, _ = self._load_table(name)
+    def rows_of(self, name: str, vehicle_id: int, drawn: str = "") -> Columns:
+        """The rows of one vehicle in a file, from all segments; with `drawn` only columns whose names match it."""
+        table = self._load_table(name, drawn)
         is_its = table["vehicle_id"] == vehicle_id
         if np.all(is_its):
             rows = Columns(table)
@@ -255,27 +268,31 @@ class Recording(VehicleColumns):
     def load_flight(self, vehicle_id: int, name: str) -> Trajectory:
         """The flight of one vehicle: the steps with a row in state.csv."""
         self._check_vehicle(vehicle_id)
-        state = self.rows_of("state.csv", vehicle_id)
-        if not len(state["step"]):
+
+        def read(file: str) -> Columns:
+            return self.rows_of(file, vehicle_id, DRAWN[file])
+
+        names = self._find_stage_names(vehicle_id)
+        state = read("state.csv")
+        steps, time_s = state["step"], state["sim_time_s"]
+        if not len(steps):
             raise InputError(f"{self.folder / 'state.csv'}: expected rows of vehicle {vehicle_id}, "
                              f"got none")
-        command = self.rows_of("command.csv", vehicle_id)
-        reference = self.rows_of("reference.csv", vehicle_id)
-        stage = align(state["step"], reference, ("stage",))[:, 0]
+        cable = read_cable(state, lambda: self.scenario, vehicle_id)
+        body = read_body(state)
+        p_WQ, p_WL = (state.take([f"{of}_{axis}_m" for axis in "xyz"]) for of in ("quad", "load"))
+        f_Q_W = align(steps, read("command.csv"), ("force_x_n", "force_y_n", "force_z_n"))
+        reference = read("reference.csv")
         return Trajectory(
-            name=name,
-            time_s=state["sim_time_s"],
-            p_WQ=state.stack(("quad_x_m", "quad_y_m", "quad_z_m")),
-            p_WL=state.stack(("load_x_m", "load_y_m", "load_z_m")),
-            p_WL_ref=align(state["step"], reference, ("ref_x_m", "ref_y_m", "ref_z_m")),
+            name=name, time_s=time_s, p_WQ=p_WQ, p_WL=p_WL, f_Q_W=f_Q_W,
+            p_WL_ref=align(steps, reference, ("ref_x_m", "ref_y_m", "ref_z_m")),
             alpha=state["alpha_rad"],
             beta=state["beta_rad"],
-            f_Q_W=align(state["step"], command, ("force_x_n", "force_y_n", "force_z_n")),
-            stages=self._find_stages(stage, reference, state["sim_time_s"], vehicle_id),
+            stages=self._find_stages(align(steps, reference, ("stage",))[:, 0], names, time_s, vehicle_id),
             period_s=self.manifest["period_s"],
             notes=self.list_notes(),
-            body=read_body(state),
-            cable=read_cable(state, lambda: self.scenario, vehicle_id))
+            body=body,
+            cable=cable)
 
     def _check_vehicle(self, vehicle_id: int) -> None:
         if vehicle_id not in self.vehicle_ids:
@@ -287,8 +304,8 @@ class Recording(VehicleColumns):
         flight = self.load_flight(vehicle_id, name)
         if not (self.folder / "measured.csv").exists():
             return flight  # the recorder writes measured.csv only if the measured state can differ
-        rows = self.rows_of("measured.csv", vehicle_id)
-        steps = self.rows_of("state.csv", vehicle_id)["step"]
+        rows = self.rows_of("measured.csv", vehicle_id, DRAWN["measured.csv"])
+        steps = self.rows_of("state.csv", vehicle_id, DRAWN["state.csv"])["step"]
         return replace(flight, p_WQ=align(steps, rows, ("quad_x_m", "quad_y_m", "quad_z_m")),
                        p_WL=align(steps, rows, ("load_x_m", "load_y_m", "load_z_m")),
                        alpha=align(steps, rows, ("alpha_rad",))[:, 0],
@@ -298,10 +315,14 @@ class Recording(VehicleColumns):
         """The flight of every vehicle, named by its id."""
         return [self.load_flight(vehicle_id, str(vehicle_id)) for vehicle_id in self.vehicle_ids]
 
-    def _find_stages(self, stage: np.ndarray, reference: Columns, time_s: np.ndarray,
-                     vehicle_id: int) -> tuple[Stage, ...]:
+    def _find_stage_names(self, vehicle_id: int) -> dict[int, str]:
+        """The names of the stages in reference.csv, by their indices."""
+        reference = self.rows_of("reference.csv", vehicle_id, "stage|stage_name")
         indices, first = np.unique(reference["stage"], return_index=True)
-        names = {int(index): str(reference["stage_name"][row]) for index, row in zip(indices, first)}
+        return {int(index): str(reference["stage_name"][row]) for index, row in zip(indices, first)}
+
+    def _find_stages(self, stage: np.ndarray, names: dict[int, str], time_s: np.ndarray,
+                     vehicle_id: int) -> tuple[Stage, ...]:
         # Starts of the stages that began before their first recorded step. Manifests of earlier versions have none.
         starts = {start["stage"]: start["step"] * self.manifest["period_s"]
                   for start in self.manifest.get("stage_starts", ())
@@ -316,8 +337,7 @@ class Recording(VehicleColumns):
     def _find_plan(self, stage: int) -> dict[str, Any]:
         """The keys of a stage in the scenario."""
         mission = self.scenario["mission"]
-        planned = mission[stage] if stage < len(mission) else {}
-        return planned if isinstance(planned, dict) else {}
+        return mission[stage] if 0 <= stage < len(mission) else {}
 
     def list_notes(self) -> tuple[str, ...]:
         """Notes on the recording: incomplete, samples missing, rows cut off, further runs in the folder."""
@@ -337,7 +357,7 @@ class Recording(VehicleColumns):
             notes.append(f"{count} samples missing, first {first['topic']} {unit} {first['from']} "
                          f"of vehicle {first['vehicle_id']}")
         notes += [f"{name}: the last row is cut off and left out"
-                  for name in COLUMNS if self._load_table(name)[1]]
+                  for name in COLUMNS if any(read_header(folder / name)[1] for folder, _ in self.segments)]
         runs = sorted(folder.name for folder in self.folder.glob("run-*") if folder.is_dir())
         if runs:
             notes.append(f"further runs are recordings of their own: {', '.join(runs)}")
@@ -359,15 +379,17 @@ class Recording(VehicleColumns):
     def read_last_status(self) -> dict[str, str]:
         """The last row of status.csv; empty if there is none. The last segments may have no rows."""
         for folder, _ in reversed(self.segments):
-            if rows := read_records(folder / "status.csv"):
-                return rows[-1]
+            if last := deque(read_records(folder / "status.csv"), 1):
+                return last[0]
         return {}
 
 
 def align(steps: np.ndarray, table: Columns, names: tuple[str, ...]) -> np.ndarray:
     """The columns `names` of `table` at `steps`; NaN for a step without a row."""
-    values = np.full((len(steps), len(names)), np.nan)
     known = table["step"]
+    if np.array_equal(known, steps):
+        return table.stack(names)
+    values = np.full((len(steps), len(names)), np.nan)
     if len(known):
         place = np.minimum(np.searchsorted(known, steps), len(known) - 1)
         found = known[place] == steps

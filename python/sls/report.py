@@ -2,8 +2,10 @@
 
 import base64
 import html
+import math
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -62,7 +64,7 @@ h1, h2, .sub, .notes { overflow-wrap: anywhere; }
 section { background: var(--panel); border: 1px solid var(--line); border-radius: 8px; padding: 18px 20px;
   margin-top: 18px; }
 .sub { color: var(--muted); margin: 0; }
-.badge { display: inline-block; border-radius: 4px; padding: 1px 9px; font-size: 13px;
+.badge { display: inline-block; white-space: nowrap; border-radius: 4px; padding: 1px 9px; font-size: 13px;
   font-weight: 600; margin-right: 6px; background: var(--accent-ground); color: var(--accent); }
 .good { background: var(--good-ground); color: var(--good); }
 .bad { background: var(--bad-ground); color: var(--bad); }
@@ -118,15 +120,17 @@ DARK = {"#ffffff": "#151b21", "#f7f7f7": "#1e262e", "#000000": "#e6ebf0", "#4444
 
 
 def make_report(recording: Recording, vehicle_id: int, first: Sequence[str] = (),
-                marks: Sequence[tuple[float, str]] = ()) -> str:
+                marks: Sequence[tuple[float, str]] = (), verdict: str = "") -> str:
     """The page as HTML. The scene may use the rest of MOST_BYTES. `first`: sections below the head. `marks`: times in s
-    that the figures mark, with what happens then. Raises InputError."""
+    that the figures mark, with what happens then. `verdict`: the badge of a check. Raises InputError."""
     name = recording.manifest["scenario"]
-    flight = recording.load_flight(vehicle_id, name)
     fleet = recording.load_fleet()
+    if vehicle_id not in recording.vehicle_ids:
+        recording.load_flight(vehicle_id, name)
+    flight = replace(fleet[recording.vehicle_ids.index(vehicle_id)], name=name)
     title = f"{name}, vehicle {vehicle_id}" if len(fleet) > 1 else name
     sections = [
-        make_head(recording, flight, title) + "".join(first),
+        make_head(recording, flight, title, verdict) + "".join(first),
         make_section("Flight", make_facts(recording, flight, vehicle_id)),
         make_section("Load position error per stage (m)", make_error_table(flight)),
         make_step_section(flight),
@@ -167,13 +171,13 @@ def make_plain_table(header: Sequence[str], rows: Sequence[Sequence[str]], style
             "</tbody></table></div>")
 
 
-def make_head(recording: Recording, flight: Trajectory, title: str) -> str:
+def make_head(recording: Recording, flight: Trajectory, title: str, verdict: str = "") -> str:
     manifest = recording.manifest
     whole = manifest["complete"]
     notes = "".join(f"<li>{escape(note)}</li>" for note in flight.notes)
     return (f"<header><h1>{escape(title)}</h1><p class=\"sub\">"
-            f"<span class=\"badge {'good' if whole else 'bad'}\">"
-            f"{'complete' if whole else 'incomplete'}</span>"
+            f"{verdict}<span class=\"badge {'bad' if not whole else '' if verdict else 'good'}\">"
+            f"{'recording ' if verdict else ''}{'complete' if whole else 'incomplete'}</span>"
             f"<span class=\"badge\">timing: {escape(manifest.get('timing') or 'unknown')}</span>"
             f"run {escape(manifest['run_id'])}</p>"
             + (f"<ul class=\"notes\">{notes}</ul>" if notes else "") + "</header>\n")
@@ -224,7 +228,7 @@ def describe_load_mass(scenario: dict[str, Any], vehicle: dict[str, Any], carrie
     share = vehicle.get("load_mass_kg", "–")
     if len(carriers) < 2:
         return f"{share} kg"
-    whole = sum(find_vehicle(scenario, carrier)["load_mass_kg"] for carrier in carriers)
+    whole = sum(find_vehicle(scenario, carrier).get("load_mass_kg", math.nan) for carrier in carriers)
     return f"{whole:g} kg, of it {share} kg the share of this vehicle"
 
 

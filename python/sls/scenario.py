@@ -5,10 +5,11 @@ import math
 import os
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from sls.campaign.yaml_nodes import parse_yaml
 from sls.core import load_core, to_core
 from sls.errors import ConfigError
 
@@ -51,6 +52,11 @@ def load_scenario(path_or_name: str | os.PathLike[str], *,
     return load_core().Scenario(file=to_core(find_scenario(path_or_name)), changes=replaced)
 
 
+def read_keys(scenario: "Scenario") -> dict[str, Any]:
+    """The keys and values of a scenario's file, as the programs read them: lists, maps, numbers, texts."""
+    return parse_yaml(scenario.text.encode(), Path(scenario.name)).to_plain()
+
+
 def to_yaml_value(value: object) -> str:
     """`value` as YAML in one line that reads back to the same bits. Texts are in quotes, lists and maps in brackets;
     numpy's numbers and arrays are treated like Python's.
@@ -73,7 +79,9 @@ def to_yaml_value(value: object) -> str:
     if isinstance(value, str):
         return json.dumps(value, ensure_ascii=False).encode().decode()  # JSON is valid YAML
     if isinstance(value, Mapping):
-        keys = [key if str(key).isidentifier() else json.dumps(key, ensure_ascii=False) for key in value]
+        # Readers of YAML 1.1 read a plain `on` as true.
+        keys = [key if str(key).isidentifier() and key not in ("on", "off", "yes", "no") else
+                json.dumps(key, ensure_ascii=False) for key in value]
         return "{" + ", ".join(f"{key}: {to_yaml_value(item)}" for key, item in zip(keys, value.values())) + "}"
     if isinstance(value, (list, tuple)):
         return "[" + ", ".join(map(to_yaml_value, value)) + "]"

@@ -3,10 +3,10 @@
 import html
 import os
 import subprocess
-import sys
 import tempfile
 from pathlib import Path
 
+from sls.launcher.place import say
 from sls.recordings import Recording
 
 MOST_BYTES = 4_000_000
@@ -51,5 +51,5 @@ def make_scene(recording: Recording, most_bytes: int) -> str:
 
 
 def leave_out(why: str) -> str:
-    print(f"sls: report without its scene: {' '.join(why.split())}", file=sys.stderr)
+    say(f"report without its scene: {' '.join(why.split())}")
     return ""

@@ -1,4 +1,4 @@
-"""The comparison of our flights with the published ones: docs/study.md and its pictures."""
+"""The comparison of our flights with the published ones: the numbers and pictures of docs/study.md."""
 
 import csv
 from collections.abc import Callable, Sequence
@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from sls import px4_study
 from sls.figures import STYLE, draw, lay_out, make_stack, plot_path, plot_positions, save, set_log_scale, style_of
 from sls.trajectory import Trajectory
-from sls.metrics import StageMetrics, calc_stage_metrics, split_laps
+from sls.metrics import calc_stage_metrics, split_laps
 from sls.px4_study import Planned, RunFailed, measure, shift_to_published
-from sls.tables import (format_error, list_error_cells, list_step_cells, make_markdown_table)
+from sls.tables import fill_page, format_error, list_error_cells, list_step_cells, make_markdown_table
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
@@ -22,20 +22,12 @@ DPI = 100
 
 
 FLIGHTS = (
-    Planned("figure_eight", "figure_eight"),
     Planned("figure_eight_1ms", "figure_eight", period_s=0.001),
-    Planned("matlab_setpoint_1", "matlab_setpoint_1", period_s=0.001),
-    Planned("matlab_setpoint_2", "matlab_setpoint_2", period_s=0.001),
-    Planned("matlab_setpoint_3", "matlab_setpoint_3", period_s=0.001),
-    Planned("matlab_figure_eight", "matlab_figure_eight", period_s=0.001),
-    Planned("setpoints", "setpoints"),
-    Planned("gazebo_legacy", "gazebo_legacy"),
-    Planned("gazebo_correct_wiring", "gazebo_correct_wiring"),
-    Planned("gazebo_corrected", "gazebo_corrected"),
-    Planned("integral_mass_error", "integral_mass_error"),
-    Planned("mass_error_without_integral", "mass_error_without_integral"),
-    Planned("rotor_drag", "rotor_drag"),
-    Planned("rotor_drag_without_feed_forward", "rotor_drag_without_feed_forward"),
+    *(Planned(f"matlab_{name}", f"matlab_{name}", period_s=0.001)
+      for name in ("setpoint_1", "setpoint_2", "setpoint_3", "figure_eight")),
+    *(Planned(name, name) for name in (
+        "figure_eight", "setpoints", "gazebo_legacy", "gazebo_correct_wiring", "gazebo_corrected", "integral_mass_error",
+        "mass_error_without_integral", "rotor_drag", "rotor_drag_without_feed_forward")),
 )
 
 # Load position error on the second lap, m, from the logs of the published MATLAB, Gazebo and PX4
@@ -125,8 +117,8 @@ def draw_pictures(flights: dict[str, Trajectory]) -> dict[str, Figure]:
 # --- the page -------------------------------------------------------------------------------------
 
 
-def make_lap_row(metrics: StageMetrics) -> list[str]:
-    return [metrics.label, *list_error_cells(metrics)[:5]]
+def make_lap_row(flight: Trajectory, label: str) -> list[str]:
+    return [label, *list_error_cells(measure(flight))[:5]]
 
 
 LAP_HEADER = ("figure eight, second lap", *PUBLISHED_LAP_2[0][1:])
@@ -135,19 +127,15 @@ STEP_HEADER = ("flight", "settling x s", "y", "z", "overshoot x %", "y", "z",
 
 
 def make_lap_table(flights: dict[str, Trajectory]) -> str:
-    ours = [
-        measure(flights["figure_eight"], "`figure_eight`, hold of 4 ms"),
-        measure(flights["figure_eight_1ms"], "`figure_eight`, hold of 1 ms"),
-        measure(flights["matlab_figure_eight"], "`matlab_figure_eight`, hold of 1 ms"),
-        measure(flights["gazebo_legacy"], "`gazebo_legacy`: published wiring"),
-        measure(shift_to_published(flights["gazebo_legacy"], "gazebo_legacy"), "`gazebo_legacy`, about z −0.5"),
-        measure(flights["gazebo_correct_wiring"],
-                      "`gazebo_correct_wiring`: only the wiring corrected"),
-        measure(flights["gazebo_corrected"],
-                      "`gazebo_corrected`: wiring and controller model corrected"),
-    ]
-    rows = [[f"published: {row[0]}", *row[1:]] for row in PUBLISHED_LAP_2[1:]]
-    return make_markdown_table(LAP_HEADER, [*rows, *map(make_lap_row, ours)])
+    published = [[f"published: {row[0]}", *row[1:]] for row in PUBLISHED_LAP_2[1:]]
+    return make_markdown_table(LAP_HEADER, published + [make_lap_row(flight, label) for flight, label in (
+        (flights["figure_eight"], "`figure_eight`, hold of 4 ms"),
+        (flights["figure_eight_1ms"], "`figure_eight`, hold of 1 ms"),
+        (flights["matlab_figure_eight"], "`matlab_figure_eight`, hold of 1 ms"),
+        (flights["gazebo_legacy"], "`gazebo_legacy`: published wiring"),
+        (shift_to_published(flights["gazebo_legacy"], "gazebo_legacy"), "`gazebo_legacy`, about z −0.5"),
+        (flights["gazebo_correct_wiring"], "`gazebo_correct_wiring`: only the wiring corrected"),
+        (flights["gazebo_corrected"], "`gazebo_corrected`: wiring and controller model corrected"))])
 
 
 def make_step_table(flights: Sequence[Trajectory]) -> str:
@@ -161,15 +149,14 @@ def make_step_table(flights: Sequence[Trajectory]) -> str:
 
 def make_drag_table(flights: dict[str, Trajectory]) -> str:
     return make_markdown_table(LAP_HEADER, [
-        make_lap_row(measure(flights["rotor_drag"], "`rotor_drag`: with feed-forward")),
-        make_lap_row(measure(flights["rotor_drag_without_feed_forward"],
-                                   "`rotor_drag_without_feed_forward`"))])
+        make_lap_row(flights["rotor_drag"], "`rotor_drag`: with feed-forward"),
+        make_lap_row(flights["rotor_drag_without_feed_forward"], "`rotor_drag_without_feed_forward`")])
 
 
 def describe_gain(flights: dict[str, Trajectory], worse: str, better: str, axes: str,
                   digits: int) -> str:
     """Ratio of the rms errors of `worse` and `better` on the second lap: "118 (x) and 48 (y)"."""
-    ratios = measure(flights[worse], "").rms_m / measure(flights[better], "").rms_m
+    ratios = measure(flights[worse]).rms_m / measure(flights[better]).rms_m
     *most, last = [f"{ratio:.{digits}f} ({axis})" for ratio, axis in zip(ratios, axes)]
     return f"{', '.join(most)} and {last}"
 
@@ -178,15 +165,15 @@ PUBLISHED_PX4 = PUBLISHED_LAP_2[-1][1:]
 
 
 def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str]) -> str:
-    """study_page.md, with the numbers and tables filled in."""
+    """docs/study.md, with the numbers and tables filled in."""
     def describe_height(name: str, digits: int) -> str:
         metrics = calc_stage_metrics(flights[name])[0]
         return f"{abs(1000.0 * metrics.step.steady_state_error_m[2]):.{digits}f}"
 
     legs = [flights[f"matlab_setpoint_{leg}"] for leg in (1, 2, 3)]
-    rod_error = measure(flights["gazebo_correct_wiring"], "").rms_m[2]
-    return (HERE / "study_page.md").read_text().format(
-        count=len(FLIGHTS) + len(px4_study.FLIGHTS),
+    rod_error = measure(flights["gazebo_correct_wiring"]).rms_m[2]
+    return fill_page(ROOT / "docs/study.md", px4_values | dict(
+        count=str(len(FLIGHTS) + len(px4_study.FLIGHTS)),
         lap_table=make_lap_table(flights),
         hold=describe_gain(flights, "figure_eight", "figure_eight_1ms", "xyz", 2),
         wired=describe_gain(flights, "gazebo_legacy", "gazebo_correct_wiring", "xy", 0),
@@ -198,7 +185,7 @@ def make_page(flights: dict[str, Trajectory], px4_values: dict[str, str]) -> str
         integral_table=make_step_table([flights["integral_mass_error"],
                                         flights["mass_error_without_integral"]]),
         drag=describe_gain(flights, "rotor_drag_without_feed_forward", "rotor_drag", "xyz", 0),
-        drag_table=make_drag_table(flights), **px4_values)
+        drag_table=make_drag_table(flights)))
 
 
 def write_study(recordings: Path, out: Path) -> Path:

@@ -1,7 +1,9 @@
 """Numbers and tables as text, for pages and for Markdown."""
 
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 from sls.metrics import StageMetrics
 
@@ -47,3 +49,10 @@ def list_error_cells(metrics: StageMetrics) -> list[str]:
 def make_markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     lines = [header, ["---"] * len(header), *rows]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines)
+
+
+def fill_page(page: Path, values: Mapping[str, str]) -> str:
+    """The text of a page with that of `values` after its markers: <!--name-->value<!--/-->, or <!--name--> in the line
+    above a table."""
+    return re.sub(r"(<!--(\w+)-->\n?)((?<=\n)(?:\|.*\n)*|.*?(?=<!--/-->))", lambda found: found[1] + values[found[2]],
+                  page.read_text())

@@ -5,13 +5,13 @@ have a row for each vehicle; world z is down."""
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
-import yaml
 from scipy import linalg
 
 from sls import cables
+from sls.scenario import read_keys
 
 if TYPE_CHECKING:
     from _sls_core import Scenario
@@ -213,7 +213,7 @@ class Team:
 def read_team(scenario: "Scenario") -> Team:
     """The group of a scenario with plant `cables` and law `cooperative`. Products of inertia, rotor drag and another
     belief of the law are left out."""
-    keys: dict[str, Any] = yaml.safe_load(scenario.text)
+    keys = read_keys(scenario)
     vehicles, plant, law = scenario.vehicles, keys["plant"], keys["controller"]
     mass_kg = np.array([vehicle.quad_mass_kg for vehicle in vehicles])
     return Team(mass_kg=mass_kg, believed_kg=mass_kg,

@@ -135,15 +135,17 @@ def calc_rod(alpha: np.ndarray, beta: np.ndarray) -> np.ndarray:
 
 
 def read_body(state: Columns) -> Body | None:
-    """Reads the body from the columns of a plant with attitude or rotors; None if there are no such columns.
+    """Takes the body from the columns of a plant with attitude or rotors; None if there are no such columns.
     At step 0 the set-points are NaN, because the autopilot has not run yet."""
     def columns(*names: str) -> np.ndarray:
         if names and set(names) <= set(state):
-            return state.stack(names)
+            return state.take(names)
         return np.full((len(state["step"]), len(names)), np.nan)
 
     def asked(*names: str) -> np.ndarray:
-        return np.where(state["step"][:, np.newaxis] > 0, columns(*names), np.nan)
+        values = columns(*names)
+        values[state["step"] <= 0] = np.nan
+        return values
 
     rotors = 0
     while f"rotor_{rotors + 1}_rad_s" in state:

@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from sls.figures import METADATA, STYLE, WIDTH_IN, colour_of, save
 from sls.input_error import InputError
+from sls.launcher.place import escape_controls
 
 # Upper ends of the delays that share a colour, ms; the last one has none.
 DELAYS_MS = (1.0, 5.0, np.inf)
@@ -79,7 +80,7 @@ def main(words: Sequence[str]) -> int:
             with matplotlib.rc_context(STYLE):
                 save(plot_worlds(read_worlds(table)), options.plot)
         except (InputError, OSError) as error:
-            print(f"worlds: error: {error}", file=sys.stderr)
+            print(f"worlds: error: {escape_controls(error)}", file=sys.stderr)
             return 2
     print(options.plot)
     return code

@@ -17,7 +17,7 @@ from processes import wait_until
 
 sys.path.insert(0, str(ROOT))
 from bench import instructions, loop  # noqa: E402
-from bench.programs import Programs, wait_for  # noqa: E402
+from bench.programs import MeasurementError, Programs  # noqa: E402
 from bench.results import LESS, Figure, Rounds, format_number, format_table  # noqa: E402
 
 GOOGLE_BENCHMARK = BUILD / "bin/sls_microbench"
@@ -260,16 +260,19 @@ class ProcessTest(FolderTest):
             process.kill()
         wait_until(lambda: not is_alive(counting), 30, "the loop has ended")
 
-    def test_a_process_is_waited_for_with_the_processor_time_it_took(self):
+    def test_programs_are_waited_for_with_the_processor_time_that_they_took(self):
         before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        burn = "import os, signal, time\nwhile time.process_time() < 1: pass\nos.kill(os.getpid(), signal.SIGKILL)"
-        process = self.programs.start([sys.executable, "-c", burn], self.programs.make_path(".log"))
-        took = wait_for(process, time.monotonic() + 60)
+        burn = "import time\nwhile time.process_time() < 1: pass"
+        took, said = self.programs.run_together({"burns": [sys.executable, "-c", burn], "says": ["echo", "1"]})
         after = resource.getrusage(resource.RUSAGE_CHILDREN)
         self.assertAlmostEqual(
-            took, after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, delta=0.01)
-        self.assertGreater(took, 0.99)
-        self.assertLess(process.returncode, 0)
+            sum(took.values()), after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, delta=0.01)
+        self.assertGreater(took["burns"], 0.99)
+        self.assertEqual(said, {"burns": "", "says": "1\n"})
+
+    def test_a_program_that_does_not_end_well_is_an_error(self):
+        with self.assertRaisesRegex(MeasurementError, "^fails ended with 3: why$"):
+            self.programs.run_together({"fails": ["sh", "-c", "echo why; exit 3"], "sleeps": ["sleep", "0.5"]})
 
 
 class ProgramTest(FolderTest):

@@ -13,8 +13,6 @@ struct Target {
   int domain = 0;
   std::uint64_t seed = 1;
   double seconds = 60;
-  bool endless_gaps = false;       ///< also send packets that block Fast DDS
-  bool forged_identities = false;  ///< also send identities that exhaust its memory
 };
 
 /// True until SIGTERM, or `target.seconds` after the first call.

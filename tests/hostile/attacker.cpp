@@ -39,9 +39,6 @@ int main(int argc, char** argv) {
   cli.add_option("--seed", target.seed);
   cli.add_option("--seconds", target.seconds, "at most");
   cli.add_option("--file", file, "captured packets");
-  cli.add_flag("--endless-gaps", target.endless_gaps, "fire also what hangs Fast DDS 2.9.1");
-  cli.add_flag("--forged-identities", target.forged_identities,
-               "fire also what takes all the memory of a secured Fast DDS 2.9.1");
   cli.add_option("--most", most, "forged participants");
   CLI11_PARSE(cli, argc, argv);
 

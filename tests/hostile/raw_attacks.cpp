@@ -129,43 +129,6 @@ Bytes make_random_bytes(std::mt19937_64& random) {
   return packet;
 }
 
-/// True if a GAP, or a HEARTBEAT's first sequence number, skips more samples than the project's own
-/// packets do. Fast DDS processes them one by one, for hours, with its reader locked: README.md,
-/// what it found.
-bool has_endless_gap(const Bytes& packet) {
-  constexpr std::uint8_t kHeartbeat = 0x07, kGap = 0x08;
-  constexpr std::size_t kHeader = 4, kFirstAt = 12, kBaseAt = 20, kEnd = 28;
-  constexpr std::int64_t kLongest = 10000;
-  for (std::size_t at = kRtpsHeader; at + kHeader <= packet.size();) {
-    const bool is_little = packet[at + 1] & 1;
-    const auto read = [&](std::size_t from, std::size_t size) {
-      std::uint32_t number = 0;
-      for (std::size_t i = 0; i < size; ++i)
-        number = number << 8 | packet[from + (is_little ? size - 1 - i : i)];
-      return number;
-    };
-    const auto read_sequence_number = [&](std::size_t from) {
-      return static_cast<std::int64_t>(std::uint64_t{read(from, 4)} << 32 | read(from + 4, 4));
-    };
-    if (at + kEnd <= packet.size()) {
-      const auto first = read_sequence_number(at + kFirstAt);
-      const auto base = read_sequence_number(at + kBaseAt);
-      const auto gap = static_cast<std::uint64_t>(base) - static_cast<std::uint64_t>(first);
-      if (packet[at] == kGap && base > first && gap > std::uint64_t{kLongest}) return true;
-      if (packet[at] == kHeartbeat && first > kLongest) return true;
-    }
-    at += kHeader + read(at + 2, 2);
-  }
-  return false;
-}
-
-/// True if a packet holds tokens of DDS Security. If a length in them is changed, a secured Fast
-/// DDS allocates that many bytes, up to gigabytes: README.md, what it found.
-bool has_identity(const Bytes& packet) {
-  const std::string kind = "DDS:Auth";
-  return std::search(packet.begin(), packet.end(), kind.begin(), kind.end()) != packet.end();
-}
-
 bool is_announcement(const Bytes& packet) {
   const std::array<std::uint8_t, 4> writer = {0x00, 0x01, 0x00, 0xc2};  // of SPDP
   return std::search(packet.begin() + kRtpsHeader, packet.end(), writer.begin(), writer.end()) !=
@@ -195,9 +158,8 @@ std::uint64_t fire_packets(const Target& target, const std::filesystem::path& ca
   Gun gun(target);
   while (goes_on(target)) {
     Bytes packet = random() % 4 ? packets[random() % packets.size()] : make_random_bytes(random);
-    if (!target.forged_identities && has_identity(packet)) continue;
     mutate(packet, 0, random);
-    if (target.endless_gaps || !has_endless_gap(packet)) gun.fire(packet);
+    gun.fire(packet);
   }
   return gun.fired();
 }
@@ -230,9 +192,8 @@ std::uint64_t spoof(const Target& target) {
   while (goes_on(target)) {
     Bytes packet = sniffer.next();
     if (packet.empty() || random() % 8) continue;  // also reads its own packets
-    if (!target.forged_identities && has_identity(packet)) continue;
     mutate(packet, kRtpsHeader, random);
-    if (target.endless_gaps || !has_endless_gap(packet)) gun.fire(packet);
+    gun.fire(packet);
   }
   return gun.fired();
 }

@@ -83,6 +83,9 @@ class SupervisionTest(FolderTest):
                         "sls: one ended with 139 (SIGSEGV): ending the others")
         self.expect_end(self.start(one="kill -BUS $$"), 1,
                         "sls: one ended with 135 (SIGBUS: is /dev/shm full? (./sls doctor, docs/networks.md))")
+        self.expect_end(self.start(one="kill -ABRT $$"), 1,
+                        "sls: one ended with 134 (SIGABRT: an assertion of a library, mostly of Fast DDS: see the "
+                        "lines above)")
 
     def test_a_program_that_ends_well_before_the_flight_is_over_ends_the_run(self):
         self.expect_end(self.start(overrun=0.3, one="exit 0", two="READY; exec sleep 100"), 1,

@@ -114,6 +114,8 @@ def test_a_flight_is_a_table_of_pandas(tmp_path):
         for columns, name in ((flight.state, "force_x_n"), (flight.reference, "ref_y_m")):
             assert np.array_equal(frame[name], columns[name])
         assert np.array_equal(frame["force_x_n_command"], flight.command["force_x_n"])
+    read = pandas.read_csv(tmp_path / "r/state.csv", float_precision="round_trip")  # docs/tutorial.md
+    assert all(np.array_equal(read[name], column) for name, column in flight.state.items())
 
 
 def test_verify_finds_what_was_changed(tmp_path):

@@ -244,7 +244,7 @@ class ReportTest(CampaignTest):
         self.expect_input_error(lambda: make_campaign_report(folder), "manifest.json", "No such")
         (folder / "manifest.json").write_text("{}")
         self.expect_input_error(lambda: make_campaign_report(folder),
-                                "manifest.json: expected the manifest of a campaign, got {}")
+                                "manifest.json: campaign: expected a text, got null")
 
     def test_a_hundred_thousand_runs_make_a_small_page_in_little_memory(self):
         folder = self.folder / "c"

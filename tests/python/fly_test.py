@@ -3,6 +3,7 @@
 import csv
 import gc
 import json
+import locale
 import os
 import signal
 import subprocess
@@ -208,6 +209,31 @@ def test_errors_are_exceptions_with_the_texts_of_the_programs(fly_with_program, 
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs /dev/full")
+@pytest.mark.parametrize("flag", ["-O1", "-Dstrtod_l(text, end, c)=strtod(text, end)"])
+def test_a_decimal_comma_changes_no_flight(tmp_path, monkeypatch, flag):
+    (tmp_path / "comma").write_text('LC_NUMERIC\ndecimal_point ","\nthousands_sep ""\ngrouping -1\nEND LC_NUMERIC\n')
+    subprocess.run(["localedef", "-c", "--no-archive", "-i", "comma", "./xx_XX"], cwd=tmp_path, capture_output=True)
+    (tmp_path / "sls").symlink_to(ROOT / "sim_server/plants/shared_library")
+    subprocess.run(["cc", "-shared", "-fPIC", flag, f"-I{tmp_path}", ROOT / "examples/my_plant/my_plant.c", "-o",
+                    tmp_path / "my_plant.so"], check=True)
+    scenario = sls.load_scenario("short", plant={
+        "model": str(tmp_path / "my_plant.so"), "parameters": {"stiffness_n_m": 2000.5},
+        "initial": {"load_position_m": [0, 0, -0.5]}})
+
+    def fly(name):
+        sls.fly("aggressive_slack").save(tmp_path / name)
+        lines = (tmp_path / name / "flight.txt").read_text().splitlines()
+        return sls.fly(scenario).certificate, [line for line in lines if "taut" in line]
+
+    before = fly("before")
+    monkeypatch.setenv("LOCPATH", str(tmp_path))
+    locale.setlocale(locale.LC_NUMERIC, "xx_XX")
+    try:
+        assert fly("after") == before and locale.str(0.5) == "0,5"
+    finally:
+        locale.setlocale(locale.LC_NUMERIC, "C")
+
+
 def test_a_disk_that_refuses_is_an_os_error(tmp_path):
     code = ("import resource, signal, sls\n"
             "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"

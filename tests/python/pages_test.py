@@ -4,6 +4,7 @@ import base64
 import os
 import re
 import subprocess
+import sys
 import unittest
 from unittest import mock
 from dataclasses import replace
@@ -14,6 +15,7 @@ import support
 import numpy as np
 
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 from places import BUILD, ROOT
 from sls import figures
 from sls.recordings import Recording
@@ -127,6 +129,32 @@ class PlotTest(support.FolderTest):
             styles = [(line.get_color(), line.get_linestyle()) for line in lines]
             self.assertEqual(len(set(styles)), 9, name)
             self.assertEqual(len({style for _, style in styles}), 4, name)
+
+    def test_a_long_line_is_thinned_and_keeps_its_extremes_and_gaps(self):
+        values = np.sin(np.arange(300_000) * 1e-3)
+        values[[123_457, 200_001, -1]] = 9, -8, 7
+        values[150_000:150_003] = np.nan
+        axes = Figure().add_subplot()
+        figures.draw(axes, np.delete(np.arange(300_000.0), slice(50_000, 90_000)), np.delete(values, slice(50_000, 90_000)))
+        x, y = axes.lines[0].get_data()
+        self.assertLess(len(y), 45_000)
+        self.assertEqual((np.nanmax(y), np.nanmin(y), y[-1]), (9, -8, 7))
+        self.assertTrue(np.all(np.diff(x[np.isfinite(x)]) > 0))
+        for begin, end in ((49_900, 90_100), (149_900, 150_100)):  # a NaN parts the line there
+            self.assertTrue(np.isnan(y[np.argmax(x > begin):np.argmax(x > end)]).any())
+
+    def test_a_report_takes_little_memory_for_each_step(self):
+        scenario = (ROOT / "config/scenarios/short.yaml").read_text().replace("period_s: 0.004", "period_s: 0.001")
+        measure = ("import resource, sys; from sls.__main__ import main; code = main(['report', sys.argv[1]]); "
+                   "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss); sys.exit(code)")
+        kilobytes = []
+        for seconds in (50, 150):  # beyond the most points of a line
+            file = self.write("long.yaml", scenario.replace("for_s: 2", f"for_s: {seconds}"))
+            subprocess.run([FLYER, f"--scenario={file}", f"--out={self.folder / 'r'}", "--force"], check=True,
+                           capture_output=True)
+            kilobytes.append(int(subprocess.run([sys.executable, "-B", "-c", measure, self.folder / "r"], check=True,
+                                                capture_output=True, text=True).stdout))
+        self.assertLess((kilobytes[1] - kilobytes[0]) / 100_000, 0.4, kilobytes)
 
     def test_figures_for_a_paper_have_its_width_no_title_and_the_chosen_panels(self):
         write_recording(self.folder / "r", last=50)

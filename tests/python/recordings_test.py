@@ -181,13 +181,13 @@ class RecordingsTest(support.FolderTest):
         (self.folder / "r").mkdir()
         self.refuse("r: expected a recording, got no manifest.json that can be read")
         (self.folder / "r/manifest.json").write_text("{")
-        self.refuse("manifest.json: expected a manifest, got: ")
+        self.refuse("manifest.json: expected JSON, got: ")
         (self.folder / "r/manifest.json").write_text("[]")
-        self.refuse("manifest.json: complete: expected bool, got null")
+        self.refuse(r"manifest.json: expected a map, got \[\]")
         write_recording(self.folder / "r")
         self.change("manifest.json", lambda text: text.replace('"vehicle_ids": [0]',
                                                                '"vehicle_ids": 0'))
-        self.refuse("manifest.json: vehicle_ids: expected list, got 0")
+        self.refuse("manifest.json: vehicle_ids: expected a list, got 0")
 
     def test_defects_of_its_files_are_named_with_file_and_line(self):
         def truncate_row(text):
@@ -207,9 +207,8 @@ class RecordingsTest(support.FolderTest):
             ("state.csv", lambda text: "", "state.csv:1: expected a header, got an empty file"),
             ("state.csv", lambda text: text.split("\n")[0] + "\n",
              "state.csv: expected rows of vehicle 0, got none"),
-            ("scenario.yaml", lambda text: "a: [", "scenario.yaml: expected YAML, got: "),
-            ("scenario.yaml", lambda text: "a: 1\n",
-             "scenario.yaml: expected a scenario with a mission"),
+            ("scenario.yaml", lambda text: "a: [", "scenario.yaml:1: expected YAML, got a syntax error"),
+            ("scenario.yaml", lambda text: "a: 1\n", "scenario.yaml: mission: expected a list, got null"),
         )
         for name, damage, message in cases:
             with self.subTest(message):

@@ -1,7 +1,9 @@
 """The campaigns of config/campaigns: files, bases, first and last runs, and the linear predictions for
 them."""
 
+import pathlib
 import unittest
+import unittest.mock
 
 import numpy as np
 from places import ROOT
@@ -12,6 +14,7 @@ from sls.campaign.campaign_file import load_campaign
 from sls.campaign.check import check_campaign
 from sls.campaign.sampling import make_values
 from sls.scenario import to_yaml_value
+from sls.tables import fill_page
 
 FOLDER = ROOT / "config/campaigns"
 FILES = sorted(FOLDER.glob("*.yaml"))
@@ -57,7 +60,14 @@ class ShippedCampaignsTest(unittest.TestCase):
         for name in findings.STUDIES:
             self.assertIn(f"](campaigns/{name}.png)", page)
             self.assertGreater((ROOT / f"docs/campaigns/{name}.png").stat().st_size, 5000)
-            self.assertIn(f"./sls campaign {name} ", page)
+            self.assertIn(f"`./sls campaign {name}`", page)
+
+    def test_values_and_tables_are_replaced_between_their_markers(self):
+        text = "Of <!--a-->1<!--/--> and <!--b-->2<!--/--> <!-- a note -->\n\n<!--a_table-->\n| x |\n| y |\n\n"
+        with unittest.mock.patch.object(pathlib.Path, "read_text", lambda _: text):
+            filled = fill_page(pathlib.Path(), {"a": "3", "b": "–", "a_table": "| z |\n", "unused": "4"})
+        self.assertEqual(filled, "Of <!--a-->3<!--/--> and <!--b-->–<!--/--> <!-- a note -->\n\n"
+                                 "<!--a_table-->\n| z |\n\n")
 
 
 class PredictionTest(unittest.TestCase):

@@ -1,6 +1,7 @@
 #include "recorder/recording_folder.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <iostream>
@@ -205,6 +206,9 @@ TEST_F(ResumeTest, AFolderThatIsNoRecordingIsRefusedAndKept) {
   write_bytes(out_ / "state.csv", std::string(1000, 'x') + "\nx");
   EXPECT_NE(find_resume_error().find("expected an empty folder"), std::string::npos);
   EXPECT_TRUE(fs::exists(out_ / "state.csv"));
+  fs::remove(out_ / "state.csv");
+  ASSERT_EQ(::mkfifo((out_ / "state.csv").c_str(), 0600), 0);
+  EXPECT_NE(find_resume_error().find("expected an empty folder"), std::string::npos);
 }
 
 TEST_F(RecordingFolderTest, ALinkIsRemovedAndItsTargetKept) {

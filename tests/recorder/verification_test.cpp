@@ -382,10 +382,25 @@ TEST_F(VerificationTest, AManifestsNumbersAreWholeNumbersThatFit) {
   }
 }
 
-TEST_F(VerificationTest, APipeInThePlaceOfAFileIsAProblem) {
-  fs::remove(b_ / "status.csv");
-  ASSERT_EQ(::mkfifo((b_ / "status.csv").c_str(), 0600), 0);
-  EXPECT_NE(find_problems(b_).find("status.csv: cannot read"), std::string::npos);
+TEST_F(VerificationTest, APipeOrADeviceInThePlaceOfAFileIsAProblem) {
+  for (const std::string file : {"status.csv", "state.csv", "command.csv", "reference.csv"}) {
+    fs::remove(b_ / file);
+    file == "state.csv" ? fs::create_symlink("/dev/zero", b_ / file)
+                        : static_cast<void>(::mkfifo((b_ / file).c_str(), 0600));
+    EXPECT_NE(find_problems(b_).find(file + ": cannot read"), std::string::npos) << file;
+  }
+  EXPECT_THROW(find_difference(), DamagedError);
+  fs::remove(b_ / "manifest.json");
+  ASSERT_EQ(::mkfifo((b_ / "manifest.json").c_str(), 0600), 0);
+  const auto find = [&] {
+    return sls::test::find_error<config::ConfigError>([&] { open_recording(b_); });
+  };
+  const std::string place = (b_ / "manifest.json").string();
+  EXPECT_EQ(find(), place + ": expected a manifest, got a pipe, socket or device");
+  fs::remove(b_ / "manifest.json");
+  write_bytes(b_ / "manifest.json", "[");
+  fs::resize_file(b_ / "manifest.json", 1ULL << 40);
+  EXPECT_EQ(find(), place + ": expected at most 2000000 bytes, got 1099511627776");
 }
 
 }  // namespace

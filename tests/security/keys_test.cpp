@@ -131,6 +131,27 @@ TEST_F(BadKeysTest, PermissionsOfSomebodyElse) {
   expect_refused(keys_.as(), "expected permissions for CN=server,OU=server,O=SLS, got none");
 }
 
+TEST_F(BadKeysTest, AKeyThatOthersMayRead) {
+  fs::permissions(file("key.pem"), fs::perms::others_read, fs::perm_options::add);
+  expect_refused(keys_.as(),
+                 file("key.pem").string() + ": expected mode 0600 or stricter, got 0604");
+}
+
+TEST_F(BadKeysTest, KeysThatEndSoonAreNamedAtTheStart) {
+  const auto start = [&](const std::string& identity) {
+    return expect_exit(
+        keys_.as(identity) +
+            make_command("sim_ctl", own_domain(), {"status", "--timeout-s", "1"}, qos("secure")),
+        1);
+  };
+  expect_exit(
+      make_keys_command({keys_.path().string(), "--add", "operator", "soon", "--days", "29"}));
+  EXPECT_TRUE(
+      holds(start("soon"),
+            "soon/certificate.pem: expected more than 30 days of validity, got 28 (until "));
+  EXPECT_FALSE(holds(start("operator"), "validity"));
+}
+
 TEST_F(BadKeysTest, ExpiredOnes) {
   keys_.add_expired("server", "old");
   expect_refused(keys_.as("old"), "got: certificate has expired");

@@ -59,12 +59,15 @@ inline OwnDomain::OwnDomain() {
 
 inline OwnDomain::~OwnDomain() {
   // The shared-memory ports of domain N, from 7400 + 250 N on, outlive processes that were killed.
-  for (int port = 7400 + 250 * number_; port < 7400 + 250 * (number_ + 1); ++port) {
-    const std::string name = std::string(bus::kSharedMemoryPrefix) + "port" + std::to_string(port);
-    for (const std::string& file : {name, name + "_el", name + "_sl", "sem." + name + "_mutex"}) {
-      std::error_code ignored;
-      std::filesystem::remove("/dev/shm/" + file, ignored);
-    }
+  const std::string prefix = std::string(bus::kSharedMemoryPrefix) + "port";
+  for (const auto& file : std::filesystem::directory_iterator("/dev/shm")) {
+    const std::string name = file.path().filename();
+    const std::size_t place = name.find(prefix);
+    if (place == name.npos) continue;
+    const long port = std::strtol(name.c_str() + place + prefix.size(), nullptr, 10) & 0xffff;
+    std::error_code ignored;
+    if (port >= 7400 + 250 * number_ && port < 7400 + 250 * (number_ + 1))
+      std::filesystem::remove(file.path(), ignored);
   }
   close(lock_);
 }

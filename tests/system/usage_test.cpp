@@ -95,6 +95,17 @@ TEST(UsageTest, TooLittleSharedMemoryIsNamedBeforeTheFirstSample) {
                    "/dev/shm: expected 10.7 MB free, got 1.0 MB: mount -o remount,size=64M");
 }
 
+TEST(UsageTest, ABusErrorIsExplainedBeforeItEndsTheProgram) {
+  OwnDomain domain;
+  Process server(
+      make_command("sim_server", domain.number(), {"--scenario", scenario("short")}, qos("udp")));
+  ASSERT_TRUE(wait_for_text(server, "waiting for: controller"));
+  server.send(SIGBUS);
+  EXPECT_EQ(server.wait(), 128 + SIGBUS);
+  EXPECT_NE(server.output().find("error: SIGBUS: memory of a file is gone"), std::string::npos)
+      << server.output();
+}
+
 TEST(UsageTest, ClientWithAnotherScenarioIsRefusedWithBothHashes) {
   TemporaryFolder folder;
   write_bytes(folder / "other.yaml", read_file(scenario("short")) + "# another byte\n");

@@ -1,7 +1,6 @@
 #include <spdlog/fmt/fmt.h>
 
-#include <iostream>
-
+#include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "tools/convert/conversion.hpp"
 
@@ -20,6 +19,6 @@ int main(int argc, char** argv) {
     const record::OpenedRecording flight = record::open_recording(folder);
     if (out.empty()) out = convert::make_default_output(flight);
     const std::uint64_t messages = convert::write_mcap(flight, out, force);
-    std::cout << fmt::format("{}: {} messages\n", out.string(), messages);
+    app::print(fmt::format("{}: {} messages", out.string(), messages));
   });
 }

@@ -11,6 +11,7 @@
 #include "common/bus/names.hpp"
 #include "common/bus/sync_counters.hpp"
 #include "common/config/yaml_node.hpp"
+#include "common/text/printable.hpp"
 
 namespace sls::ctl {
 namespace {
@@ -21,28 +22,14 @@ namespace {
 using Cell = std::string;
 using Cells = std::vector<Cell>;
 
-/// The characters of `text`, which any participant may have sent. Control characters and bytes that
-/// are not UTF-8 become question marks.
+/// The characters of `text`, which any participant may have sent. A question mark stands for
+/// what is not printable.
 Cells to_cells(const std::string& text) {
-  const auto is_continuation = [&](std::size_t i) {
-    return i < text.size() && (static_cast<unsigned char>(text[i]) & 0xc0) == 0x80;
-  };
   Cells cells;
   for (std::size_t i = 0; i < text.size();) {
-    const auto lead = static_cast<unsigned char>(text[i]);
-    const std::size_t length = lead < 0x80   ? 1
-                               : lead < 0xc2 ? 0
-                               : lead < 0xe0 ? 2
-                               : lead < 0xf0 ? 3
-                               : lead < 0xf5 ? 4
-                                             : 0;
-    bool is_whole = length > 0;
-    for (std::size_t k = 1; k < length; ++k) is_whole = is_whole && is_continuation(i + k);
-    const bool is_control =
-        is_whole && (lead < ' ' || lead == 0x7f ||
-                     (lead == 0xc2 && static_cast<unsigned char>(text[i + 1]) < 0xa0));
-    cells.push_back(is_whole && !is_control ? text.substr(i, length) : "?");
-    i += is_whole ? length : 1;
+    const std::size_t length = text::calc_printable_length(text, i);
+    cells.push_back(length > 0 ? text.substr(i, length) : "?");
+    i += std::max<std::size_t>(text::calc_utf8_length(text, i), 1);
   }
   return cells;
 }
@@ -378,7 +365,7 @@ std::string to_json(const Snapshot& snapshot) {
                                     {"ready", participant.ready()},
                                     {"done", participant.done()},
                                     {"last_complete_step", participant.last_complete_step()}});
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return json.dump(-1, ' ', true, Json::error_handler_t::replace);
 }
 
 }  // namespace sls::ctl

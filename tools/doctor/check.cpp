@@ -43,7 +43,7 @@ std::string to_json(const std::vector<Check>& checks) {
         {{"name", check.name}, {"verdict", to_string(check.verdict)}, {"text", check.text}});
   // Names of programs and hosts come from the network: bytes that are not UTF-8 are replaced.
   return nlohmann::json{{"ok", !has_finding(checks)}, {"checks", list}}.dump(
-      2, ' ', false, nlohmann::json::error_handler_t::replace);
+      2, ' ', true, nlohmann::json::error_handler_t::replace);
 }
 
 std::string join(const std::vector<std::string>& words) {

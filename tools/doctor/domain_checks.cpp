@@ -103,7 +103,10 @@ Check check_security(const Observations& seen) {
                        " and the doctor reject each other: not the same authority, or an "
                        "identity that is not valid: give every machine keys of one ./sls keys "
                        "DIR, and see that they are not expired");
-  return ok(kName, is_secured ? "all programs have a valid identity" : "no program uses it");
+  const std::string& expiry = seen.settings.expiry;
+  return ok(kName, is_secured ? "all programs have a valid identity" +
+                                    (expiry.empty() ? "" : "; " + expiry)
+                              : "no program uses it");
 }
 
 // --- samples -------------------------------------------------------------------------------------

@@ -2,6 +2,7 @@
 
 #include <cstdio>
 
+#include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/bus/qos_file.hpp"
@@ -47,7 +48,7 @@ int main(int argc, char** argv) {
     if (is_json)
       std::puts(doctor::to_json(checks).c_str());
     else
-      for (const auto& check : checks) std::puts(doctor::to_line(check).c_str());
+      for (const auto& check : checks) app::print(doctor::to_line(check));
     std::vector<std::string> findings;
     for (const auto& check : checks)
       if (check.verdict == doctor::Verdict::kFinding) findings.push_back(check.name);

@@ -18,6 +18,7 @@
 #include <utility>
 
 #include "common/bus/fastdds/facts_of.hpp"
+#include "common/bus/fastdds/guarded_transports.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/participant_ids.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
@@ -128,9 +129,7 @@ struct Observer::Impl : bus::ParticipantListener {
           {ports.metatraffic(0), ports.participant_gain}, bus::find_own_participant_ids());
     hear(qos);
     bus::MiddlewareLog::clear();
-    auto* factory = dds::DomainParticipantFactory::get_instance();
-    participant = factory->create_participant(static_cast<std::uint32_t>(options.domain), qos, this,
-                                              dds::StatusMask::none());
+    participant = bus::create_participant(options.domain, qos, this);
     if (!participant)
       throw bus::BusError("domain " + std::to_string(options.domain) +
                           ": cannot join: " + bus::MiddlewareLog::find_first_error());

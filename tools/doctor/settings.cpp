@@ -5,6 +5,8 @@
 #include <algorithm>
 
 #include "common/bus/node.hpp"
+#include "common/bus/qos_file.hpp"
+#include "common/bus/security_files.hpp"
 #include "common/bus/topics.hpp"
 #include "fastdds_api.hpp"
 #include "tools/doctor/file_qos.hpp"
@@ -77,6 +79,7 @@ Settings load_settings(const std::filesystem::path& qos_file, int domain,
     settings.discovery_servers.push_back(rtps::IPLocator::ip_to_string(locator) + ":" +
                                          std::to_string(locator.port));
   settings.is_secured = is_secured(qos);
+  settings.expiry = bus::check_security_files(bus::read_qos_file(qos_file, identity)).expiry;
   return settings;
 }
 

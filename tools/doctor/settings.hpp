@@ -19,6 +19,7 @@ struct Settings {
   bool uses_multicast = false;                 ///< for discovery
   std::vector<std::string> discovery_servers;  ///< "10.0.0.1:11811"; empty: none is used
   bool is_secured = false;
+  std::string expiry;  ///< SecurityFiles::expiry
 
   /// True if no data leave the machine.
   bool is_local() const;

@@ -40,15 +40,15 @@ SharedMemory survey_shared_memory(const std::filesystem::path& folder) {
     auto& owners = found.stale_owners;
     if (std::find(owners.begin(), owners.end(), owner) == owners.end()) owners.push_back(owner);
   }
-  const std::string kPortLock = std::string(bus::kSharedMemoryPrefix) + "port%d_el%n";
+  const std::string kPortLock = std::string(bus::kSharedMemoryPrefix) + "port%u_el%n";
   std::error_code error;
   for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    int port = 0, length = 0;
+    std::uint32_t port = 0;
+    int length = 0;
     const std::string name = entry.path().filename();
     if (std::sscanf(name.c_str(), kPortLock.c_str(), &port, &length) != 1) continue;
     if (length != static_cast<int>(name.size())) continue;  // not the lock of a port
-    if (bus::is_port_read(port, folder))
-      found.read_ports.push_back(static_cast<std::uint32_t>(port));
+    if (bus::is_port_read(port, folder)) found.read_ports.push_back(port);
   }
   return found;
 }

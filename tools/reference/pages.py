@@ -26,7 +26,7 @@ def to_range(key):
     elif key["type"] != "text":
         text = re.sub(r"\b(?:radians )?from ", "", text)
         text = re.sub(r"\bpi\b", "π", text).replace("-", "−").replace(">=", "≥").replace("<=", "≤")
-    if key["also"].startswith(">"):
+    if key["also"].startswith("<!--range-->>"):
         return key["also"]  # stricter than the rule for the value alone
     return ("; " if text and key["also"] else "").join([text, key["also"]])
 
@@ -65,7 +65,11 @@ def merge_alike(rows):
 
 
 def make_scenario_page(build):
-    text = "# Scenario keys\n\n" + NOTE + """
+    text = "# Scenario keys\n\n" + """\
+<!-- The meanings, and in other cells what follows a marker (unit, range, default, or none: the behaviour without a value),
+are written here. ./sls reference makes the rest of the tables from the code's own. tests/docs/reference_test.py compares.
+A new key needs a row with its name and meaning in any table, and a row needs a key. -->
+
 Every key of a scenario file. [common/config](../../common/config/README.md) describes how the file is read, and fleets.
 
 - All units are SI, angles are in radians, the world frame is x forward, y right, z down.
@@ -76,8 +80,6 @@ Every key of a scenario file. [common/config](../../common/config/README.md) des
 """
     sections = {}
     for key in sources.load_keys(build):
-        if key["default_words"] == "as in `plant.rotor`":
-            continue  # the meaning of `plant.rotors` says it for all
         section = sections.setdefault(re.split(r"[.\[]", key["path"])[0], {})
         # Keys of a model have a table of their own; the meaning of other conditional keys ends with their condition.
         condition = to_condition(key) if key["condition"] else ""
@@ -100,6 +102,7 @@ def make_recordings_page(build):
     return "# Columns of a recording\n\n" + NOTE + """
 Every CSV file of a recording and its columns, as `recorder --columns` prints them.
 [recorder](../../recorder/README.md) says what the other files hold.
+`pandas.read_csv` changes last bits, unless it is called with `float_precision="round_trip"`.
 
 """ + columns + "\n"
 

@@ -8,8 +8,6 @@ import subprocess
 import sys
 import xml.etree.ElementTree as xml
 
-import yaml
-
 import help_text
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -99,37 +97,38 @@ def find_unit(path):
     return UNITS[max(fitting, key=len)] if fitting else ""
 
 
-def _fits(pattern, path):
-    patterns, parts = pattern.split("."), path.split(".")
-    return len(patterns) == len(parts) and all(p in ("*", part) for p, part in zip(patterns, parts))
+def load_words():
+    """{key: what its row of the page says by hand}: `text`, the meaning; others with their marker, `<!--range-->`."""
+    words = {}
+    for line in read("docs/reference/scenario.md").splitlines():
+        if line.startswith("| `"):
+            keys, *_, meaning = line[2:-2].split(" | ")
+            by_hand = {name: text for text, name in re.findall(r"(<!--(\w+)-->.*?) \|", line)}
+            by_hand["text"] = re.sub(r" With `\w+`: [^.]*\.$", "", meaning)
+            words |= dict.fromkeys(re.findall("`(.*?)`", keys), by_hand)
+    return words
 
 
 def load_keys(build):
     """Every key with unit and meaning.
 
-    @throws StaleReference for a key without a meaning or a meaning without a key.
+    @throws StaleReference for a key without a row of the page or a row without a key.
     """
-    keys = json.loads(run([build / "bin/sls_scenario_keys"]))
-    entries = {pattern: {"text": entry} if isinstance(entry, str) else entry
-               for pattern, entry in yaml.safe_load(read("tools/reference/meanings.yaml")).items()}
-    used = set()
-
-    def find(path, field):
-        for pattern, entry in entries.items():
-            if field in entry and _fits(pattern, path):
-                used.add(pattern)
-                return str(entry[field])
-        return ""
-
+    words_of = load_words()
+    unused = set(words_of)
     rows, by_path = [], {}
-    for key in keys:
+    for key in json.loads(run([build / "bin/sls_scenario_keys"])):
         path = key["path"]
-        key["meaning"] = find(path, "text")
-        if not key["meaning"]:
-            raise StaleReference(f"tools/reference/meanings.yaml: no entry for the key '{path}'")
-        key["unit"] = find(path, "unit") or find_unit(path)
-        key["also"] = find(path, "range")
-        words = find(path, "default") or (find(path, "none") if key["default"] == "none" else "")
+        if path.replace("plant.rotors[i].", "plant.rotor.") in words_of.keys() - {path}:
+            continue  # the meaning of `plant.rotors` says it for all
+        if path not in words_of:
+            raise StaleReference(f"docs/reference/scenario.md: no row for the key '{path}'")
+        unused.discard(path)
+        by_hand = words_of[path]
+        key["meaning"] = by_hand["text"]
+        key["unit"] = by_hand.get("unit") or find_unit(path)
+        key["also"] = by_hand.get("range", "")
+        words = by_hand.get("default") or (by_hand.get("none", "") if key["default"] == "none" else "")
         key["default_words"] = words
         # Keys that differ only in a default that depends on another key share one row.
         alike = (path, key["type"], key["range"], key["presence"], key["condition"])
@@ -137,9 +136,8 @@ def load_keys(build):
             continue
         by_path[alike] = key
         rows.append(key)
-    unused = [pattern for pattern in entries if pattern not in used]
     if unused:
-        raise StaleReference(f"tools/reference/meanings.yaml: no key for the entry '{unused[0]}'")
+        raise StaleReference(f"docs/reference/scenario.md: no key for the row of '{min(unused)}'")
     return rows
 
 

@@ -1,7 +1,6 @@
 #include <spdlog/fmt/fmt.h>
 
-#include <iostream>
-
+#include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "recorder/verification.hpp"
 
@@ -12,33 +11,33 @@ using record::OpenedRecording;
 
 void verify_one(const OpenedRecording& flight) {
   const record::Inspection inspection = record::inspect(flight);
-  for (const std::string& problem : inspection.problems) std::cout << problem << '\n';
+  for (const std::string& problem : inspection.problems) app::print(problem);
   const auto& manifest = flight.manifest();
   if (!manifest.complete)
-    std::cout << fmt::format("not complete: {}: {}\n", manifest.outcome, manifest.reason);
-  if (!manifest.missing.empty()) std::cout << describe(manifest.missing) << '\n';
+    app::print(fmt::format("not complete: {}: {}", manifest.outcome, manifest.reason));
+  if (!manifest.missing.empty()) app::print(describe(manifest.missing));
   if (!inspection.problems.empty())
     throw app::RunError(flight.folder.string() + ": differs from its manifest");
-  std::cout << fmt::format("matches its manifest: {} steps, certificate {}\n", inspection.steps,
-                           inspection.certificate);
+  app::print(fmt::format("matches its manifest: {} steps, certificate {}", inspection.steps,
+                         inspection.certificate));
 }
 
 void verify_two(const OpenedRecording& a, const OpenedRecording& b) {
   const record::Inspection of_a = record::inspect(a), of_b = record::inspect(b);
-  for (const std::string& problem : of_a.problems) std::cout << "A: " << problem << '\n';
-  for (const std::string& problem : of_b.problems) std::cout << "B: " << problem << '\n';
-  for (const std::string& note : record::list_notes(a, b)) std::cout << note << '\n';
+  for (const std::string& problem : of_a.problems) app::print("A: " + problem);
+  for (const std::string& problem : of_b.problems) app::print("B: " + problem);
+  for (const std::string& note : record::list_notes(a, b)) app::print(note);
   if (const auto difference = record::find_first_difference(a, b)) {
-    std::cout << "first difference: " << difference->text << '\n';
+    app::print("first difference: " + difference->text);
     if (a.manifest().scenario_sha256 != b.manifest().scenario_sha256)
       throw app::RunError("A and B are flights of different scenarios");
     const auto deviations = record::list_deviations(a, b);
-    if (!deviations.empty()) std::cout << "largest difference of each column that differs:\n";
-    for (const auto& deviation : deviations) std::cout << "  " << describe(deviation) << '\n';
+    if (!deviations.empty()) app::print("largest difference of each column that differs:");
+    for (const auto& deviation : deviations) app::print("  " + describe(deviation));
     throw app::RunError("A and B differ");
   }
   if (of_a.steps == 0) throw app::RunError("nothing to compare: neither A nor B holds a step");
-  std::cout << fmt::format("equal: {} steps, certificate {}\n", of_a.steps, of_a.certificate);
+  app::print(fmt::format("equal: {} steps, certificate {}", of_a.steps, of_a.certificate));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <vector>
 
+#include "common/bus/fastdds/host_id.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
 
 namespace sls::bus {
@@ -38,8 +39,8 @@ bool choose_data_sharing(dds::DataSharingQosPolicy& policy, bool is_on_this_mach
     return false;
   }
   // Fast DDS would let all processes of a host share. Containers of a host may have a /dev/shm
-  // each, on a device each, and the two versions put other contents under the same names.
-  const auto id = minor(folder.st_dev) * 2 + (kFastDdsMajor == 2 ? 0 : 1);
+  // each, on a device each, and another build puts other contents under the same names.
+  const auto id = minor(folder.st_dev) * 40'503U + middleware_build();
   policy.automatic(std::vector<std::uint16_t>{static_cast<std::uint16_t>(id)});
   return true;
 }

@@ -62,9 +62,11 @@ class ParticipantListener : public DiscoveryListener {
       neighbours_->note_participant(peer, news.name, find_address(news), find_obstacle(news));
     if (discovered_) discovered_->note(peer, news.name, find_discovery_ports(news));
     if (news.kind != ParticipantNews::Kind::kNew) return;
+    const auto process = news.properties.find(kProcessProperty);
     refusals.note_discovered(
         guid, describe(news.name, find_address(news), news.guid.guidPrefix),
-        own_.is_secured && news.identity ? describe_identity(*news.identity) : "");
+        own_.is_secured && news.identity ? describe_identity(*news.identity) : "",
+        process == news.properties.end() ? "" : process->second);
     if (own_.is_secured && !news.identity && news.is_identity_known)
       refusals.note_refused(guid, kNoIdentity);
     if (!own_.is_secured && news.identity)
@@ -81,7 +83,8 @@ class ParticipantListener : public DiscoveryListener {
     guid.entityId = rtps::c_EntityId_RTPSParticipant;
     Refusals::of_process().note_discovered(
         to_text(guid), describe(other.name, address, guid.guidPrefix),
-        other.certificate.empty() ? "" : describe_identity({other.certificate, other.authority}));
+        other.certificate.empty() ? "" : describe_identity({other.certificate, other.authority}),
+        other.process);
     if (!other.is_secured) Refusals::of_process().note_refused(to_text(guid), kNoIdentity);
     if (!other.version.empty())
       judge_version(to_text(guid), other.version);

@@ -125,6 +125,7 @@ std::optional<PlainAnnouncement> find_announcement(const std::uint8_t* message, 
         for (std::uint32_t count = value.read(4); count > 0 && !value.is_short(); --count) {
           const std::string key = value.read_string(), text = value.read_string();
           if (key == "sls.fastdds") found.version = text;
+          if (key == "sls.process") found.process = text;
           if (key == "sls.certificate") found.certificate = text;
           if (key == "sls.authority") found.authority = text;
         }

@@ -23,6 +23,7 @@ namespace sls::bus {
 struct PlainAnnouncement {
   std::string name;                    ///< of the participant; it chooses it
   std::string version;                 ///< of its Fast DDS, if it is a program of ours; else empty
+  std::string process;                 ///< its process, if it is a program of ours; else empty
   std::string certificate, authority;  ///< subjects, if it is a program of ours; else empty
   bool is_secured = false;             ///< it announces an identity
   bool is_leaving = false;             ///< it only says that it leaves

@@ -2,7 +2,11 @@
 
 #include <spdlog/spdlog.h>
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <utility>
 
 #include "common/bus/fastdds/middleware_log.hpp"
@@ -30,7 +34,33 @@ std::string explain(const std::string& message) {
   return reason;
 }
 
+/// Names this machine since its start and the namespace of its processes.
+const std::string& name_machine() {
+  static const std::string name = [] {
+    std::string boot;
+    std::getline(std::ifstream("/proc/sys/kernel/random/boot_id"), boot);
+    std::error_code error;
+    return boot + " " + std::filesystem::read_symlink("/proc/self/ns/pid", error).string() + " ";
+  }();
+  return name;
+}
+
+/// True if that process was on this machine and has ended, also if its parent has not waited for
+/// it.
+bool has_ended(const std::string& process) {
+  const std::string& machine = name_machine();
+  const std::string number = process.substr(std::min(process.size(), machine.size()));
+  if (process.compare(0, machine.size(), machine) != 0 || number.empty() ||
+      number.find_first_not_of("0123456789") != number.npos)
+    return false;
+  std::error_code error;
+  std::filesystem::read_symlink("/proc/" + number + "/exe", error);
+  return error == std::errc::no_such_file_or_directory;
+}
+
 }  // namespace
+
+std::string Refusals::name_process() { return name_machine() + std::to_string(::getpid()); }
 
 Refusals::~Refusals() {
   {
@@ -47,7 +77,7 @@ Refusals& Refusals::of_process() {
 }
 
 void Refusals::note_discovered(const std::string& guid, const std::string& description,
-                               const std::string& claim) {
+                               const std::string& claim, const std::string& process) {
   const std::lock_guard lock(mutex_);
   if (known_.size() >= kMostKnown) return;
   const auto [known, is_new] = known_.emplace(guid, description);
@@ -56,7 +86,7 @@ void Refusals::note_discovered(const std::string& guid, const std::string& descr
     return;
   }
   if (claim.empty()) return;
-  pending_.emplace(guid, Pending{Clock::now() + kTimeToProve, claim});
+  pending_.emplace(guid, Pending{Clock::now() + kTimeToProve, claim, process});
   if (!watcher_.joinable()) watcher_ = std::thread([this] { watch(); });
   changed_.notify_one();
 }
@@ -104,6 +134,8 @@ void Refusals::watch() {
     } else if (Clock::now() < next->second.deadline) {
       const auto deadline = next->second.deadline;  // `next` may be erased meanwhile
       changed_.wait_until(lock, deadline);
+    } else if (has_ended(next->second.process)) {
+      pending_.erase(next);
     } else {
       report(next->first, "no proof of an identity that holds here within " +
                               std::to_string(kTimeToProve.count()) + " s; it claims " +

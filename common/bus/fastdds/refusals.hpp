@@ -33,10 +33,14 @@ class Refusals {
   /// destroyed, because the middleware may still log while the process exits.
   static Refusals& of_process();
 
+  /// This machine since its start, the namespace of its processes, and this process.
+  static std::string name_process();
+
   /// Adds a discovered participant with its description. If it has a `claim`, the identity that it
-  /// announces, it is reported unless `note_accepted` is called within `kTimeToProve`.
+  /// announces, it is reported unless `note_accepted` is called within `kTimeToProve`, or its
+  /// `process` has ended on this machine: one that is killed does not say that it leaves.
   void note_discovered(const std::string& guid, const std::string& description,
-                       const std::string& claim = {});
+                       const std::string& claim = {}, const std::string& process = {});
   void note_accepted(const std::string& guid);
   void note_gone(const std::string& guid);
 
@@ -51,7 +55,7 @@ class Refusals {
  private:
   struct Pending {
     Clock::time_point deadline;
-    std::string claim;
+    std::string claim, process;
   };
 
   void watch();

@@ -21,9 +21,10 @@ inline constexpr mode_t kOwnMark = S_ISVTX;
 /// vehicles. A flight of a few vehicles touches a tenth of it.
 inline constexpr std::uint32_t kMostSharedData = 5'500'000;
 
-/// Removes the shared-memory segments of killed processes, and their memory for data sharing.
-/// Otherwise these files, 4 MB and more, would stay until the machine restarts, and with a full
-/// /dev/shm the next process would crash. Those of living processes, which hold a lock, and of
+/// Removes the shared-memory segments of killed processes, their memory for data sharing, and what
+/// they had not finished when they were killed. Otherwise these files, 4 MB and more, would stay
+/// until the machine restarts, and with a full /dev/shm the next process would crash; and whoever
+/// opens an unfinished port waits for ever. Those of living processes, which hold a lock, and of
 /// other users stay. Never throws.
 void remove_stale_segments(const std::filesystem::path& folder = "/dev/shm");
 
@@ -41,15 +42,16 @@ struct ParticipantPorts {
   int gain = 2;
 };
 
-/// True if a living process reads the shared-memory port `port`, whose files are in `folder`.
-bool is_port_read(int port, const std::filesystem::path& folder = "/dev/shm");
+/// True if a living process reads a port, whose files are in `folder` (make_memory_port()).
+bool is_port_read(std::uint32_t memory_port, const std::filesystem::path& folder = "/dev/shm");
 
 /// The participant id to request, or −1 if Fast DDS can choose any.
 ///
 /// A killed process leaves the lock files of its ports, and the next process on such a port
 /// replaces the port. A process that has the old port open gets no notice: neither process receives
-/// the other's data (Fast DDS 2.9, #4728). So if there are such files, an id without any is chosen,
-/// which is not in `own_ids`, those of this process (participant_ids.hpp).
+/// the other's data (Fast DDS 2.9, #4728). One killed while it made a port leaves a file at which
+/// the next waits for ever. So if there are such files, an id without any is chosen, which is not
+/// in `own_ids`, those of this process (participant_ids.hpp).
 int choose_participant_id(const ParticipantPorts& ports, const std::set<int>& own_ids,
                           const std::filesystem::path& folder = "/dev/shm");
 

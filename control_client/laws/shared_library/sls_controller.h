@@ -9,8 +9,8 @@
  * There is one controller per vehicle. Different controllers can be called on different threads at
  * the same time, but each one has only one call at a time. An answer must be a function of the
  * input alone. The state of the law (integrals, filter states) belongs in the memory numbers: they
- * travel with the samples, so another client can take over. Do not change the floating-point mode:
- * link without -ffast-math. */
+ * travel with the samples, so another client can take over. Do not change the floating-point mode
+ * (link without -ffast-math), the locale, the working folder or the umask. */
 #ifndef SLS_CONTROLLER_H
 #define SLS_CONTROLLER_H
 

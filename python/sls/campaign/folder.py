@@ -17,15 +17,24 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from sls.campaign.campaign import Campaign
+from sls.campaign.campaign import MOST_RUNS, Campaign
 from sls.campaign.engines import EngineError
 from sls.campaign.machine import describe_machine, find_difference, host_name
 from sls.campaign.used_files import refuse_changed_files
 from sls.campaign.whole_files import WholeFile, is_left_over, write_whole
 from sls.input_error import InputError
+from sls.strict_files import MOST_BYTES, check_shape, read_json, read_limited
 
 COLLECT_JOB = "collect job, "  # the lock's text begins so if a collect job holds it: slurm.py
 COLLECT_S = 60.0              # --resume waits for it so long
+MOST_CHUNKS = 500_000
+MOST_ROW_BYTES = 10_000  # on average
+RUNS = range(1, MOST_RUNS + 1)
+PLAN = {"campaign": str, "sha256": str, "file": str, "base": str, "engine": str, "first": range(MOST_RUNS),
+        "last": range(MOST_RUNS), "campaign_runs": RUNS, "chunk_runs": RUNS, "columns": [str], "machine": {"*": str},
+        "allow_other_machines": bool, "used_files?": {"*": str}}
+MANIFEST = {"campaign": str, "file": str, "runs?": RUNS, "outcomes?": {"*": RUNS},
+            "own_errors?": {"*": {"runs": RUNS, "first": str}}}
 OWN_FILES = {"lock", "campaign.yaml", "base.yaml", "chunks", "kept"}  # files that may exist before plan.json
 
 
@@ -72,14 +81,22 @@ class CampaignFolder:
         """The plan of the folder. Raises InputError if there is none."""
         file = self.folder / "plan.json"
         try:
-            return Plan(**json.loads(file.read_text()))
+            plan = Plan(**read_json(file, PLAN))
         except FileNotFoundError:
             raise InputError(f"{self.folder}: expected the folder of a campaign, got one without "
                              "plan.json") from None
         except OSError as error:
             raise InputError(f"{file}: expected to read it, got: {error.strerror}") from None
-        except (ValueError, TypeError) as error:
+        except TypeError as error:
             raise InputError(f"{file}: expected the plan of a campaign, got: {error}") from None
+        if not plan.first <= plan.last < plan.campaign_runs:
+            raise InputError(f"{file}: first, last: expected runs from 0 to {plan.campaign_runs - 1}, got "
+                             f"{plan.first} to {plan.last}")
+        if "outcome" not in plan.columns:
+            raise InputError(f"{file}: columns: expected 'outcome' among them, got {','.join(plan.columns):.80}")
+        if (plan.last - plan.first) // plan.chunk_runs >= MOST_CHUNKS:
+            raise InputError(f"{file}: chunk_runs: expected at most {MOST_CHUNKS} chunks, got more")
+        return plan
 
     @cached_property
     def campaign(self) -> Campaign:
@@ -89,7 +106,7 @@ class CampaignFolder:
         # The original base is preferred, because paths of libraries in it are relative to its folder.
         base, copy = Path(self.plan.base), self.folder / "base.yaml"
         try:
-            is_same = base.read_bytes() == copy.read_bytes()
+            is_same = read_limited(base) == read_limited(copy)
         except OSError:
             is_same = False
         campaign = load_campaign(self.folder / "campaign.yaml", base=base if is_same else copy,
@@ -296,7 +313,7 @@ class CampaignFolder:
     def read_whole_chunk(self, number: int) -> Chunk:
         """Reads a chunk. Raises DamagedChunk with the defect, also if there is no file."""
         try:
-            text = self.chunk_file(number).read_bytes()
+            text = read_limited(self.chunk_file(number), MOST_BYTES + MOST_ROW_BYTES * self.plan.chunk_runs)
         except FileNotFoundError:
             raise DamagedChunk("missing") from None
         except OSError as error:
@@ -318,7 +335,12 @@ class CampaignFolder:
         if re.findall(rb"^(\d+),", rows, re.MULTILINE) != [
                 b"%d" % index for index in range(first, last + 1)] or not rows.endswith(b"\n"):
             raise DamagedChunk("rows are missing")
-        return Chunk(rows, json.loads(flown))
+        try:
+            flown = json.loads(flown)
+            check_shape(self.chunk_file(number), flown, {"host": str, "machine": {"*": str}, "wall_s": float})
+        except (ValueError, RecursionError):
+            raise DamagedChunk("facts about its flights are damaged") from None
+        return Chunk(rows, flown)
 
     def read_chunk(self, number: int) -> list[list[str]]:
         """The cells of the chunk's rows. Raises DamagedChunk."""
@@ -366,7 +388,7 @@ class CampaignFolder:
 def read_text(file: Path) -> str:
     """The text of a file of a campaign. Raises InputError."""
     try:
-        return file.read_text()
+        return read_limited(file).decode()
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "bytes that are no text"
         raise InputError(f"{file}: expected a file of a campaign, got: {reason}") from None
@@ -375,12 +397,9 @@ def read_text(file: Path) -> str:
 def read_manifest(file: Path) -> dict[str, Any]:
     """The manifest of a campaign. Raises InputError."""
     try:
-        manifest = json.loads(read_text(file))
-    except ValueError as error:
-        raise InputError(f"{file}: expected JSON, got: {error}") from None
-    if not isinstance(manifest, dict) or not {"campaign", "file"} <= manifest.keys():
-        raise InputError(f"{file}: expected the manifest of a campaign, got {str(manifest):.40}")
-    return manifest
+        return read_json(file, MANIFEST)
+    except OSError as error:
+        raise InputError(f"{file}: expected a file of a campaign, got: {error.strerror}") from None
 
 
 def to_line(cells: Sequence[str]) -> bytes:

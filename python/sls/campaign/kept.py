@@ -5,7 +5,6 @@ only when the table is complete. For its recording a run is flown again; the rec
 certificate of the run's row."""
 
 import heapq
-import json
 import os
 import shutil
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from sls.campaign.runs import fly_whole, make_runs
 from sls.campaign.sampling import make_values
 from sls.campaign.whole_files import name_temporary, sync_folder
 from sls.errors import RunError
+from sls.strict_files import read_json
 
 if TYPE_CHECKING:
     from _sls_core import Runs
@@ -50,7 +50,7 @@ def keep_run(folder: CampaignFolder, campaign: Campaign, runs: "Runs",
         target.parent.mkdir(exist_ok=True)
         shutil.rmtree(temporary, ignore_errors=True)
         save(fly_whole(campaign, runs, make_values(campaign, index, index)[0]), temporary)
-        certificate = json.loads((temporary / "manifest.json").read_text())["certificate"]
+        certificate = find_certificate(temporary)
         if row["certificate"] not in ("", certificate) and not folder.plan.allow_other_machines:
             raise EngineError(f"{target}: expected certificate {row['certificate']} of runs.csv, "
                               f"got {certificate}")
@@ -78,7 +78,7 @@ def save(flight: "Flight", recording: Path) -> None:
 def find_certificate(recording: Path) -> str | None:
     """The certificate of a recording; None if it has none or cannot be read."""
     try:
-        return json.loads((recording / "manifest.json").read_text()).get("certificate")
+        return read_json(recording / "manifest.json", {"certificate?": str}).get("certificate")
     except (OSError, ValueError):
         return None
 

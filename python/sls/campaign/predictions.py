@@ -1,4 +1,4 @@
-"""Linear predictions of the shipped campaigns, derived in findings_page.md."""
+"""Linear predictions of the shipped campaigns, derived in docs/campaigns.md."""
 
 from collections.abc import Sequence
 from dataclasses import replace

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from sls.campaign import drawing
 from sls.campaign.drawing import OUTCOME_COLOURS, Scale, format_number, format_share, name_unit
@@ -21,7 +20,9 @@ from sls.campaign.folder import read_manifest, read_text
 from sls.campaign.pairs import (describe_changes, describe_interval, find_pairs, make_measure_rows,
                                 make_outcome_rows)
 from sls.campaign.run_table import OUTCOMES, RunTable, find_rows, read_runs
-from sls.campaign.statistics import calc_quantiles, calc_share_interval
+from sls.campaign.statistics import calc_medians, calc_quantiles, calc_share_interval
+from sls.campaign.yaml_nodes import parse_yaml
+from sls.input_error import InputError
 from sls.report import escape, join_page, make_fact_list, make_plain_table, make_section
 
 MOST_VALUES = 41  # a key with more values gets bins of equal width instead of one bin per value
@@ -122,11 +123,11 @@ def name_word(word: str) -> str:
     beginning."""
     if word.startswith("{"):
         try:
-            values = list(yaml.safe_load(word).values())
-        except (yaml.YAMLError, AttributeError):
-            values = []
-        if values and not isinstance(values[0], (dict, list)):
-            word = str(values[0])
+            first = next(iter(parse_yaml(word.encode(), Path()).read_map().values()), None)
+        except InputError:
+            first = None
+        if first and not (first.is_map or first.is_list):
+            word = first.node.value
     return word if len(word) <= 24 else f"{word[:23]}…"
 
 
@@ -239,13 +240,9 @@ def calc_class_medians(table: RunTable, measure: str, place: np.ndarray,
     """Median of `measure` in each class over the runs that finished; NaN if none did."""
     values = table.numbers[measure]
     use = table.is_outcome("finished") & np.isfinite(values)
-    order = np.argsort(place[use], kind="stable")
-    places, values = place[use][order], values[use][order]
-    medians = np.full(shape[0] * shape[1], np.nan)
-    starts = np.flatnonzero(np.diff(places, prepend=-1))
-    for start, end in zip(starts, [*starts[1:], len(places)]):
-        medians[places[start]] = np.median(values[start:end])
-    return medians.reshape(shape)
+    medians = np.full(shape, np.nan)
+    medians.flat[np.unique(place[use])] = calc_medians(values[use], place[use])
+    return medians
 
 
 def make_pair_section(table: RunTable) -> str:

@@ -6,6 +6,7 @@ their paths, `outcome`, `reason`, the measures, `own_error` (if the user defines
 `certificate`."""
 
 import csv
+import io
 import re
 from array import array
 from collections import Counter
@@ -14,9 +15,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import yaml
 
+from sls.campaign.campaign import MOST_RUNS
+from sls.campaign.campaign_file import MOST_BYTES
+from sls.campaign.yaml_nodes import parse_yaml, read_bytes
 from sls.input_error import InputError
+from sls.strict_files import open_regular
 
 OWN_ERROR = "own_error"
 OUTCOMES = ("finished", "lost", "failed")
@@ -76,7 +80,7 @@ class Column:
 def read_rows(file: Path) -> Iterator[list[str]]:
     """Header and rows. Raises InputError."""
     try:
-        with file.open(newline="") as lines:
+        with io.TextIOWrapper(open_regular(file), "utf-8", newline="") as lines:
             yield from csv.reader(lines)
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         reason = error.strerror if isinstance(error, OSError) else error
@@ -117,7 +121,7 @@ def read_runs(file: Path) -> RunTable:
             for numbers, cell in zip(values, row[first_measure:]):
                 numbers.append(float(cell) if cell else np.nan)
             steps.append(float(row[-2] or "nan"))
-        except ValueError as error:
+        except (ValueError, OverflowError) as error:
             raise InputError(f"{file}:{line}: expected a run of {len(header)} fields, "
                              f"got: {error}") from None
         if row[len(keys) + 2]:
@@ -139,7 +143,7 @@ def count_points(file: Path) -> int | None:
     """The runs of each draw of a campaign file: the product of its grids and lists. None if nothing is drawn,
     or if there is no campaign file. It was checked when the campaign was planned."""
     try:
-        campaign = yaml.safe_load(file.read_text())
+        campaign = parse_yaml(read_bytes(file, "a campaign", MOST_BYTES), file).to_plain()
         points, is_drawn = 1, bool(campaign.get("seeds"))
         for varied in (campaign.get("vary") or {}).values():
             if grid := varied.get("grid"):
@@ -148,7 +152,8 @@ def count_points(file: Path) -> int | None:
                 points *= len(items)
             elif "derived" not in varied:
                 is_drawn = True
-    except (OSError, ValueError, AttributeError, LookupError, TypeError, yaml.YAMLError):
+        is_drawn &= 0 < points <= MOST_RUNS
+    except (ValueError, AttributeError, LookupError, TypeError):
         return None
     return points if is_drawn else None
 

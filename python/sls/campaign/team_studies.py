@@ -13,6 +13,7 @@ from sls.campaign.predictions import (calc_rest_error, calc_team_limit, change_f
                                       read_base_team)
 from sls.campaign.run_table import OUTCOMES, RunTable
 from sls.figures import colour_of
+from sls.tables import make_markdown_table
 
 
 def study_team(table: RunTable) -> tuple[Figure, dict[str, str]]:
@@ -33,8 +34,7 @@ def study_team(table: RunTable) -> tuple[Figure, dict[str, str]]:
     figure, (left, right) = make_figure(2, "A team of three, law cooperative", 9.6, 3.9)
     draw_classes(left, masses, delays, np.where(outcome == 0, 0, outcome + 1)[load, :, length].T)
     left.plot(masses, mass_limits, color="#0b5394", linewidth=2, drawstyle="steps-mid")
-    left.set_xlabel("mass of vehicle 0 (kg); the law assumes 0.25")
-    left.set_ylabel("delay of its forces (s)")
+    left.set(xlabel="mass of vehicle 0 (kg); the law assumes 0.25", ylabel="delay of its forces (s)")
     left.legend(handles=[Patch(color=CLASS_COLOURS[place], label=label) for place, label in
                          ((0, "finishes"), (2, "lost"), (3, "failed"))]
                 + [Line2D([], [], color="#0b5394", linewidth=2, label="linear: end of stability")],
@@ -46,8 +46,7 @@ def study_team(table: RunTable) -> tuple[Figure, dict[str, str]]:
                    linestyle="none", label=f"load of {whole:.3g} kg")
         right.plot(fine, [calc_rest_error(change_first(team, mass_kg=value), whole) for value in fine],
                    color=colour_of(place), linewidth=1)
-    right.set_xlabel("mass of vehicle 0 (kg); the law assumes 0.25")
-    right.set_ylabel("largest error of an end at rest (m)")
+    right.set(xlabel="mass of vehicle 0 (kg); the law assumes 0.25", ylabel="largest error of an end at rest (m)")
     right.legend(loc="upper center")
 
     flown = delays[held[load, mass] - 1]
@@ -95,27 +94,24 @@ def study_team_failure(table: RunTable) -> tuple[Figure, dict[str, str]]:
         push[0, 2] = 1.0
         slope = np.linalg.norm(firm.calc_sag(push), axis=1).max()
         left.plot(fine, slope * fine, color=colour_of(place), linewidth=1)
-    left.set_xlabel("lift that vehicle 0 loses (N)")
-    left.set_ylabel("largest error of an end (m)")
+    left.set(xlabel="lift that vehicle 0 loses (N)", ylabel="largest error of an end (m)")
     left.legend(loc="upper left")
     right.plot(gains, errors[:, 0, 0], color=colour_of(0), marker="o", markersize=4, label="its cable is cut")
     for place, chosen in ((1, 0.5), (2, 1.0)):
         right.plot(gains, errors[:, 1, lost_n.index(chosen)], color=colour_of(place), marker="o", markersize=4,
                    label=f"it loses {chosen:g} N of lift")
     right.axhline(0.5, color="#444444", linewidth=0.8, linestyle=":", label="lost: a cable's length")
-    right.set_xlabel("k_R of the attitude (1/s²)")
-    right.set_ylabel("largest error of an end (m)")
+    right.set(xlabel="k_R of the attitude (1/s²)", ylabel="largest error of an end (m)")
     right.legend(loc="upper right")
 
     def describe(run: tuple[int, int, int]) -> str:
         return f"{errors[run]:.3f}" if outcome[run] == 0 else OUTCOMES[outcome[run]]
 
-    rows = "\n".join(
-        f"| {gain:g} | " + " | ".join(
-            [describe((row, 0, 0)), describe((row, 1, frozen)),
-             *(describe((row, 1, place)) for place in lifts[1:])]) + " |" for row, gain in enumerate(gains))
+    rows = make_markdown_table(
+        ("k_R, 1/s²", "its cable is cut", "its client dies, the force stays",
+         *(f"{value:g} N less lift" for value in by_lift[1:])),
+        [[f"{gain:g}", describe((row, 0, 0)), describe((row, 1, frozen)),
+          *(describe((row, 1, place)) for place in lifts[1:])] for row, gain in enumerate(gains)])
     is_cut_off = np.array_equal(errors[:, 0], np.repeat(errors[:, 0, :1], len(words), axis=1), equal_nan=True)
-    return figure, {"tf_runs": str(len(table)), "tf_rows": rows,
-                    "tf_lifts": " | ".join(f"{value:g} N less lift" for value in by_lift[1:]),
-                    "tf_rule": " | ".join("---" for _ in by_lift[1:]),
+    return figure, {"tf_runs": str(len(table)), "tf_table": rows,
                     "tf_cut_off": "nothing" if is_cut_off else "something"}

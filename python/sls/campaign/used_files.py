@@ -11,6 +11,7 @@ import yaml
 
 from sls.campaign.campaign import Campaign
 from sls.input_error import InputError
+from sls.strict_files import open_regular
 
 # Python, whose version the plan holds, and this package, which the user does not change.
 OTHERS = [Path(sysconfig.get_path("stdlib")).resolve(), Path(__file__).resolve().parents[1]]
@@ -47,7 +48,8 @@ def hash_used_files(campaign: Campaign) -> dict[str, str]:
 def calc_hash(file: Path) -> str:
     """Raises InputError if the file cannot be read."""
     try:
-        return hashlib.sha256(file.read_bytes()).hexdigest()
+        with open_regular(file) as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as error:
         raise InputError(f"{file}: expected a file that the campaign uses, got: {error.strerror}") from None
 

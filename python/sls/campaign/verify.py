@@ -1,6 +1,5 @@
 """Flies runs of a campaign again with the three programs over DDS and compares certificates."""
 
-import json
 import os
 import re
 import subprocess
@@ -19,6 +18,7 @@ from sls.campaign.whole_files import explained, name_temporary
 from sls.core import load_core
 from sls.launcher.place import BUILD, START
 from sls.dds_domain import own_domain
+from sls.strict_files import read_json
 
 if TYPE_CHECKING:
     from _sls_core import Runs
@@ -58,8 +58,8 @@ def fly_over_dds(scenario: Path, recording: Path, domain: int) -> str:
         raise EngineError(f"{scenario}: expected a flight of less than {LONGEST_FLIGHT_S:.0f} s, "
                           "got a longer one") from None
     try:
-        return json.loads((recording / "manifest.json").read_text())["certificate"]
-    except (OSError, ValueError, KeyError):
+        return read_json(recording / "manifest.json", {"certificate": str})["certificate"]
+    except (OSError, ValueError):
         said = done.stderr.strip().splitlines()
         raise EngineError(f"{scenario}: expected a recording with a certificate, got exit code "
                           f"{done.returncode}: {said[-1] if said else 'nothing said'}") from None

@@ -19,6 +19,7 @@ from sls.campaign.own_measures import load_own_measures
 from sls.campaign.runs import Announce, RefusedRun, fly_range, make_runs
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
+from sls.launcher.place import escape_controls
 
 
 MISTAKES = (ConfigError, RefusedRun, ImportError)  # the user must repair them
@@ -138,7 +139,7 @@ def main(arguments: Sequence[str]) -> int:
         fly_listed(options)
         return 0
     except (*MISTAKES, *FAILURES) as error:
-        print(f"campaign-worker: error: {error}", file=sys.stderr)
+        print(f"campaign-worker: error: {escape_controls(error)}", file=sys.stderr)
         return to_exit_code(error)
     except KeyboardInterrupt:
         return 130

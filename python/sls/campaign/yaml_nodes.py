@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 import yaml
 
 from sls.input_error import InputError
+from sls.strict_files import open_regular
 
 MOST_DEPTH = 16
 WHOLE = re.compile(r"[-+]?[0-9]+")
@@ -64,7 +65,7 @@ class Place:
     @property
     def is_nothing(self) -> bool:
         return (isinstance(self.node, yaml.ScalarNode) and self.node.style is None
-                and self.node.value in ("", "~", "null"))
+                and self.node.value in ("", "~", "null", "Null", "NULL"))
 
     def list_items(self) -> list["Place"]:
         """The items of a list. The path of an item ends with its index in brackets."""
@@ -122,8 +123,8 @@ class Place:
             return text
         if text in ("true", "false"):
             return text == "true"
-        if WHOLE.fullmatch(text):
-            return int(text) if len(text) <= 20 else None
+        if WHOLE.fullmatch(text) and len(text) <= 20:
+            return int(text)
         if NUMBER.fullmatch(text):
             return float(text) if abs(float(text)) < float("inf") else None
         if re.fullmatch(r"[-+]?\.?(inf|Inf|INF|nan|NaN|NAN)", text):
@@ -160,6 +161,15 @@ class Place:
             self.fail_expected("a value")
         return value
 
+    def to_plain(self) -> Any:
+        """The value as the programs read it: maps, lists, numbers, truth values, texts; None for nothing."""
+        if self.is_list:
+            return [item.to_plain() for item in self.list_items()]
+        if self.is_map:
+            return {key: value.to_plain() for key, value in self.read_map().items()}
+        value = self.find_scalar()
+        return self.node.value if value is None and not self.is_nothing else value
+
     def find(self, path: str) -> "Place | None":
         """The place below this one at `path`, which has keys and indices separated by dots; None if there
         is none."""
@@ -191,7 +201,7 @@ def to_printable(text: str, most: int = 40) -> str:
 def read_bytes(file: Path, what: str, most: int) -> bytes:
     """The bytes of a file. Raises InputError if it cannot be read or has more than `most` bytes."""
     try:
-        with file.open("rb") as stream:
+        with open_regular(file) as stream:
             data = stream.read(most + 1)
     except OSError as error:
         fail(file, 0, "", f"expected {what}, got no file that can be read ({error.strerror})")
@@ -216,6 +226,7 @@ def parse_yaml(data: bytes, file: Path) -> Place:
                 fail(file, line, "", "expected a value, got a YAML alias (write the value out)")
             if getattr(event, "anchor", None):
                 fail(file, line, "", "expected a value, got a YAML anchor (write the value out)")
+            getattr(event, "value", "").encode()  # half of a surrogate pair could not be printed
             if getattr(event, "tag", None):
                 fail(file, line, "", f"expected a plain value, got the YAML tag {event.tag}")
             depth += isinstance(event, yaml.CollectionStartEvent)
@@ -234,6 +245,10 @@ def parse_yaml(data: bytes, file: Path) -> Place:
             fail(file, line, "", "expected one YAML document, got a second one")
         fail(file, line, "",
              f"expected YAML, got a syntax error: {to_printable(str(problem), 100)}")
+    except (ValueError, OverflowError) as error:  # PyYAML lets those of an impossible escape through
+        if isinstance(error, InputError):
+            raise
+        fail(file, 0, "", f"expected YAML, got a syntax error: {to_printable(str(error), 100)}")
     if root is None:
         mark = yaml.Mark(str(file), 0, 0, 0, None, None)
         root = yaml.ScalarNode("", "", mark, mark)

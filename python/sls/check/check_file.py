@@ -12,15 +12,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import yaml
-
 from sls.campaign.expressions import Expression, ExpressionError
 from sls.campaign.yaml_nodes import Place, parse_yaml, read_bytes
 from sls.check.faults import PLACEMENTS, Fault, list_faults
 from sls.errors import ConfigError
 from sls.launcher.place import list_names, suggest
 from sls.measures import AXES, MEASURES
-from sls.scenario import ROOT, find_scenario, load_scenario
+from sls.scenario import ROOT, find_scenario, load_scenario, read_keys
 
 if TYPE_CHECKING:
     from _sls_core import Scenario
@@ -106,7 +104,7 @@ class Check:
     @cached_property
     def is_lockstep(self) -> bool:
         """Whether equal flights have equal bytes over DDS."""
-        sync = yaml.safe_load(self.scenario.text).get("sync") or {}
+        sync = read_keys(self.scenario).get("sync") or {}
         return sync.get("mode") != "realtime"
 
 
@@ -310,7 +308,7 @@ def read_words(what: Place, kind: str, folder: Path) -> tuple[str, ...]:
 
 def put_library(controller: Participant, scenario: "Scenario", file: Path) -> "Scenario":
     """The scenario with the library as its law. Only another library has the same keys beside it."""
-    law, values = controller.words[0], yaml.safe_load(scenario.text)
+    law, values = controller.words[0], read_keys(scenario)
     # It flies from another folder.
     changes = {f"{key}.model": str((file.parent / model).resolve()) for key in ("plant", "autopilot")
                if str(model := (values.get(key) or {}).get("model")).endswith(".so")}

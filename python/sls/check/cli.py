@@ -17,10 +17,10 @@ from sls.check.difference import find_difference
 from sls.check.faults import PLACEMENTS, WORDS, Fault, check_able, parse_fault
 from sls.check.flights import fly
 from sls.check.judge import judge, open_recording
-from sls.check.results import HELD, Result, describe, find_code, make_rows, write_files
+from sls.check.results import HELD, Result, count_verdicts, describe, find_code, make_rows, write_files
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
-from sls.launcher.place import printing, say
+from sls.launcher.place import printing, say, show
 
 MOST_LOG_LINES = 30
 MEANING = "Flies the scenario of each check file and judges its recording."
@@ -238,16 +238,13 @@ def print_results(results: Sequence[Result]) -> None:
     shown = {(one.check, one.placement, *one.list_problems()): one for one in reversed(results) if one.placement}
     shown = list(reversed(shown.values()))
     for line in make_rows(shown, shutil.get_terminal_size((10**6, 0)).columns):
-        print(line)
+        show(line)
     for one in shown:
         for problem in one.list_problems():
-            print(f"{one.name}: {problem}")
-    verdicts = [one.verdict for one in results]
-    words = ", ".join(f"{verdicts.count(word)} {word}" for word in dict.fromkeys((HELD, *sorted(verdicts)))
-                      if verdicts.count(word))
+            show(f"{one.name}: {problem}")
     flown = [(one.check, one.certificate) for one in results if one.certificate]
     are_same = len(set(flown)) == len({check for check, _ in flown}) < len(flown)
-    print(f"{len(results)} flight{'s' if len(results) > 1 else ''}: {words}"
+    print(count_verdicts(results)
           + ("; the flights of each check have equal bytes" if are_same else ""))
 
 

@@ -5,10 +5,13 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from sls.check.results import HELD, NOT_HELD, Result
+from sls.check.results import CODES, HELD, NOT_HELD, Result, count_verdicts
 from sls.errors import ConfigError, RunError
 from sls.recordings import Recording
 from sls.report import TEXT, escape, join_page, make_plain_table, make_report, make_section
+
+MOST_PROBLEMS = 3
+STYLE = "@media screen { .text td:first-child { white-space: nowrap; } }"
 
 
 def write_pages(folder: Path, results: Sequence[Result]) -> None:
@@ -16,9 +19,20 @@ def write_pages(folder: Path, results: Sequence[Result]) -> None:
     for result in results:
         if result.verdict != HELD and result.folder:
             write_page(folder, result)
-    table = make_plain_table((), [[name_flight(one, folder), escape(one.verdict),
-                                   escape("; ".join(one.list_problems()[:1]))] for one in results], TEXT)
-    (folder / "index.html").write_text(join_page("checks", [make_section("Checks", table)]), encoding="utf-8")
+    head = f"<header><h1>Checks</h1><p class=\"sub\">{make_badge(worst(results))}{count_verdicts(results)}</p></header>\n"
+    table = make_plain_table(("flight", "verdict", "why"), [
+        [name_flight(one, folder), make_badge(one.verdict), "<br>".join(map(escape, one.list_problems()[:MOST_PROBLEMS]))]
+        for one in sorted(results, key=lambda one: one.verdict == HELD)], TEXT)
+    page = join_page("Checks", [head, make_section("Flights", table)], count_verdicts(results), STYLE)
+    (folder / "index.html").write_text(page, encoding="utf-8")
+
+
+def worst(results: Sequence[Result]) -> str:
+    return max((result.verdict for result in results), key=lambda verdict: CODES[verdict], default=HELD)
+
+
+def make_badge(verdict: str) -> str:
+    return f"<span class=\"badge {'good' if verdict == HELD else 'bad'}\">{verdict}</span>"
 
 
 def write_page(folder: Path, result: Result) -> None:
@@ -45,18 +59,18 @@ def make_page(result: Result, folder: Path) -> str:
     vehicle = next((one.vehicle for one in missed if one.vehicle is not None), None)
     try:
         recording = Recording(folder)
-        return make_report(recording, recording.vehicle_ids[0] if vehicle is None else vehicle, sections, marks)
+        return make_report(recording, recording.vehicle_ids[0] if vehicle is None else vehicle, sections, marks,
+                           make_badge(result.verdict))
     except (ConfigError, RunError, ImportError) as error:
         sections.append(f"<p class=\"small\">No figures: {escape(error)}</p>")
-        return join_page(result.name, [f"<h1>{escape(result.name)}</h1>\n", *sections])
+        head = f"<header><h1>{escape(result.name)}</h1><p class=\"sub\">{make_badge(result.verdict)}</p></header>\n"
+        return join_page(result.name, [head, *sections])
 
 
 def make_verdict(result: Result) -> str:
-    badges = {is_held: f"<span class=\"badge {style}\" style=\"white-space: nowrap\">{word}</span>"
-              for is_held, style, word in ((True, "good", HELD), (False, "bad", NOT_HELD))}
     table = make_plain_table(
         ("verdict", "expectation", "value", "bound", "worst at", "because"),
-        [[badges[one.is_held], escape(one.text), f"{escape(one.got)} {escape(one.unit)}", escape(one.bound), one.where,
+        [[make_badge(HELD if one.is_held else NOT_HELD), escape(one.text), f"{escape(one.got)} {escape(one.unit)}", escape(one.bound), one.where,
           escape(one.because)] for one in result.judged], TEXT)
     problems = "".join(f"<li>{escape(problem)}</li>" for problem in result.list_problems())
     return f"<p class=\"sub\">{escape(result.name)}: {result.verdict}</p><ul class=\"notes\">{problems}</ul>{table}"

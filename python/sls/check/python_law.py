@@ -9,6 +9,7 @@ from typing import Any
 
 import sls
 from sls.errors import ConfigError, RunError
+from sls.launcher.place import escape_controls
 from sls.user_module import load_user_module
 
 STEPS = "steps"
@@ -55,7 +56,7 @@ def main(words: list[str]) -> int:
             sls.Client(law, sls.load_scenario(Path(words[2])), qos=words[3], domain=int(words[4]), name=words[5],
                        strength=int(words[6])).run()
     except (ConfigError, RunError) as error:
-        print(f"controller: {error}", file=sys.stderr)
+        print(f"controller: {escape_controls(error)}", file=sys.stderr)
         return 2 if isinstance(error, ConfigError) else 1
     return 0
 

@@ -71,6 +71,13 @@ class Result:
                 "expectations": [to_finite(asdict(one)) for one in self.judged]}
 
 
+def count_verdicts(results: Sequence[Result]) -> str:
+    """`3 flights: 2 held, 1 not held`."""
+    verdicts = [one.verdict for one in results]
+    words = ", ".join(f"{verdicts.count(word)} {word}" for word in CODES if word in verdicts)
+    return f"{len(results)} flight{'s' if len(results) != 1 else ''}: {words}"
+
+
 def find_code(results: Sequence[Result]) -> int:
     return max((CODES[result.verdict] for result in results), default=0)
 
@@ -107,11 +114,12 @@ def make_suite(check: str, results: Sequence[Result]) -> str:
         if one.verdict != HELD:
             lines = one.list_problems()
             kind = "failure" if one.verdict == NOT_HELD else "error"
-            inner = f"<{kind} message={quote(lines[0])}>{clean(lines)}</{kind}>" if lines else ""
+            place = f"{one.file}: " if kind == "failure" else ""  # an error names its own
+            inner = f"<{kind} message={quote(place + lines[0])}>{clean(lines)}</{kind}>" if lines else ""
             inner += f"<system-out>{clean(make_rows([one]))}</system-out>" if one.judged else ""
             logs = [f"{name}: {line}" for name, text in one.logs.items() for line in text.splitlines()]
             inner += f"<system-err>{clean(logs)}</system-err>" if logs else ""
-        cases += (f"  <testcase classname={quote(check)} name={quote(one.flight or 'file')} file={quote(one.file)} "
+        cases += (f"  <testcase classname={quote(check)} name={quote(one.flight or 'file')} "
                   f"time=\"{one.wall_s:.3f}\">{inner}</testcase>\n")
     return f" <testsuite name={quote(check)} {count(results)}>\n{cases}</testsuite>\n"
 

@@ -33,7 +33,7 @@ def run_logged(log: Path, *command: str | Path, **more: Any) -> tuple[bool, str]
     if done.returncode != 0:
         lines = text.splitlines()
         errors = [line for line in lines if re.search(r"[eE]rror|ERROR|SUMMARY|what\(\)", line)]
-        say("\n".join(errors[:20] or lines[-15:]))
+        say(*(errors[:20] or lines[-15:]))
     return done.returncode == 0, text
 
 

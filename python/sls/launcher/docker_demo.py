@@ -120,7 +120,7 @@ def fly(name: str, compose: list[str], recording: Path) -> int:
             done = subprocess.run([*compose, "up", "--no-start"], stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
                                   text=True, check=False)
             if done.returncode != 0:
-                say("\n".join(done.stdout.splitlines()[-5:]))
+                say(*done.stdout.splitlines()[-5:])
                 raise Failure("the containers were not made")
             if name == "fleet":
                 services = [f"{service}-{half}" for service in services for half in HALVES]

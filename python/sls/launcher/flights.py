@@ -14,7 +14,7 @@ from pathlib import Path
 from sls.launcher.arguments import POSITIVE, Parser, checked, filled, one_of, whole
 from sls.launcher.building import FLYING, PYTHON, build_programs
 from sls.launcher.building import run as run_program
-from sls.launcher.place import BUILD, PACKAGE, PYTHON_PATH, ROOT, SELF, Failure, say
+from sls.launcher.place import BUILD, PACKAGE, PYTHON_PATH, ROOT, SELF, Failure, say, show
 from sls.launcher.supervision import WRITERS_PATIENCE_S, Supervisor
 
 DOMAIN = whole(0, 232)
@@ -181,7 +181,7 @@ def print_comparison(lap: list[str]) -> None:
 
 def print_summary(recording: Path) -> None:
     text = (recording / "flight.txt").read_text(encoding="utf-8")
-    print(f"\n{text}")
+    show(f"\n{text}")
     rows = [line.split() for line in text.splitlines()]
     lap = next((row[2:7] for row in rows if row[:2] == ["lap", "2"] and row[2] != "(part)"), None)
     if lap and rows[0][:1] == ["figure_eight:"]:
@@ -189,4 +189,4 @@ def print_summary(recording: Path) -> None:
     print(f"Files in {recording}")
     for file in sorted(recording.iterdir()):
         if file.is_file():
-            print(f"  {file.name:<16} {file.stat().st_size:>10} bytes")
+            show(f"  {file.name:<16} {file.stat().st_size:>10} bytes")

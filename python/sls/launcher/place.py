@@ -3,6 +3,7 @@
 import codecs
 import difflib
 import os
+import re
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -33,8 +34,17 @@ class Failure(Exception):
         self.code = code
 
 
-def say(text: str) -> None:
-    text = text.replace("see ./sls", f"see {SELF}")
+# C0, DEL, C1, separators of lines, changes of direction, bytes that are not UTF-8.
+CONTROLS = re.compile("[\0-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def escape_controls(text: object) -> str:
+    """`text`, which may be of a file or of the network, in one line that cannot control a terminal."""
+    return CONTROLS.sub(lambda found: found[0].encode("unicode_escape").decode(), str(text))
+
+
+def say(*lines: str) -> None:
+    text = "\n".join(map(escape_controls, lines)).replace("see ./sls", f"see {SELF}")
     try:
         print(f"sls: {text}", file=sys.stderr, flush=True)
     except OSError:
@@ -70,6 +80,11 @@ def printing() -> Iterator[None]:
             sys.stdout.flush()
     except BrokenPipeError:
         drop(1)
+
+
+def show(text: str) -> None:
+    """Prints `text`, which may have several lines, on standard output."""
+    print("\n".join(map(escape_controls, text.split("\n"))))
 
 
 def list_names(kind: str) -> list[str]:

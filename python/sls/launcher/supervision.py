@@ -19,6 +19,7 @@ USUAL_PATIENCE_S, WRITERS_PATIENCE_S = 30.0, 600.0
 # Programs of a flight end together, except those that write files.
 OVERRUN_S = 60.0
 CAUSES = {signal.SIGBUS: ": is /dev/shm full? (./sls doctor, docs/networks.md)",
+          signal.SIGABRT: ": an assertion of a library, mostly of Fast DDS: see the lines above",
           signal.SIGKILL: ": killed, perhaps because memory ran out"}
 
 

@@ -4,6 +4,8 @@
 #include <cerrno>
 #include <cstring>
 
+#include "common/text/regular_file.hpp"
+
 namespace sls::record {
 namespace {
 
@@ -13,8 +15,12 @@ constexpr std::size_t kLongestRecord = 1 << 20;  // in a valid file: some hundre
 }  // namespace
 
 CsvReader::CsvReader(const std::filesystem::path& file, std::string_view header, Further further)
-    : path_(file.string()), stream_(file, std::ios::binary) {
-  if (!stream_) throw DamagedError(path_ + ": cannot read: " + std::strerror(errno));
+    : path_(file.string()) {
+  try {
+    stream_ = text::open_regular_file(file);
+  } catch (const text::NoRegularFile& error) {
+    throw DamagedError(path_ + ": cannot read: expected a file, got " + error.what());
+  }
   const std::string expected(header);
   const bool is_there = find_record();
   const std::string line = is_there ? buffer_.substr(begin_, end_ - begin_) : "";

@@ -8,8 +8,8 @@
  * The body frame B and the world frame W have x forward, y right, z down. SI units, radians. Paths
  * are relative to the scenario file. There is one autopilot per vehicle. Calls of different
  * autopilots come on different threads; calls of one autopilot never overlap. Its output must
- * depend only on the setup and the sequence of its inputs. Do not change the floating-point mode:
- * link without -ffast-math. */
+ * depend only on the setup and the sequence of its inputs. Do not change the floating-point mode
+ * (link without -ffast-math), the locale, the working folder or the umask. */
 #ifndef SLS_AUTOPILOT_H
 #define SLS_AUTOPILOT_H
 

@@ -24,7 +24,7 @@ void Preparation::check_claim(const Surroundings& around) const {
   const int progress = run_.report.has_published() ? sync::calc_progress(run_.report.phase()) : 0;
   const std::string rival =
       describe_rival(around.find_other_runs(), run_.run_id, run_.fleet.ids(), progress);
-  if (!rival.empty()) throw std::runtime_error(rival);
+  if (!rival.empty()) throw std::runtime_error(rival + around.describe_other_flight());
 }
 
 void Preparation::start_gathering(sync::Time now) {
@@ -43,7 +43,8 @@ bool Preparation::gather(const Surroundings& around, sync::Time now) {
     throw std::runtime_error(gathering_->describe_error() + describe_obstacles());
   const auto report = gathering_->take_report(now);
   if (!report) return false;
-  run_.outputs.log({false, report->text + describe_obstacles() + report->hint});
+  const std::string obstacles = describe_obstacles();
+  run_.outputs.log({false, report->text + (obstacles.empty() ? report->hint : obstacles)});
   if (report->is_news)
     run_.report.publish(RunPhase::PHASE_WAITING, "missing: " + gathering_->missing(), now);
   return false;

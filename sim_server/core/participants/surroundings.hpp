@@ -90,6 +90,8 @@ class Surroundings {
   /// The causes that may keep participants from being discovered, to be appended to a message; else
   /// empty.
   virtual std::string describe_isolation() const = 0;
+  /// The flight of another server on this machine, to be appended likewise.
+  virtual std::string describe_other_flight() const { return ""; }
 
   /// The queues on the way to the network.
   struct Queues {

@@ -2,8 +2,8 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <charconv>
 #include <cmath>
-#include <cstdio>
 #include <utility>
 
 #include "common/config/numbers.hpp"
@@ -24,8 +24,8 @@ const std::vector<PlantSetup::Vehicle>& check_vehicles(const PlantSetup& setup) 
 
 std::string describe_time(double time) {
   char text[32];
-  std::snprintf(text, sizeof text, "%.9f s", time);
-  return text;
+  const auto end = std::to_chars(text, text + sizeof text, time, std::chars_format::fixed, 9);
+  return std::string(text, end.ptr) + " s";
 }
 
 }  // namespace
@@ -224,8 +224,10 @@ void CablesPlant::note(const cables::Event& event) {
       return remark(vehicle, body + " lifts off" + time);
     case Kind::kTaut: {
       char impulse[32];
-      std::snprintf(impulse, sizeof impulse, "%.6g N s", event.impulse);
-      return remark(vehicle, "cable taut" + time + ", impulse " + impulse);
+      const auto end = std::to_chars(impulse, impulse + sizeof impulse, event.impulse,
+                                     std::chars_format::general, 6);
+      return remark(vehicle,
+                    "cable taut" + time + ", impulse " + std::string(impulse, end.ptr) + " N s");
     }
   }
 }

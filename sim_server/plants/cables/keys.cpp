@@ -31,6 +31,26 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
                     : config::VehicleShape();
   }
 
+  double calc_swing_rate(const config::Scenario& scenario, std::uint32_t id) const override {
+    const auto& keys = scenario.plant.own.get<CablesKeys>();
+    Eigen::Vector3d turning = Eigen::Vector3d::Zero();  // of the load, about its axes, 1/s²
+    double square = 0.0;
+    for (std::uint32_t i = 0; i < scenario.vehicles.size(); ++i) {
+      const model::SlungLoadParameters vehicle = make_vehicle_scenario(scenario, i).vehicle;
+      const CableKeys cable = get_cable(keys, i);
+      double length = vehicle.rod_length;
+      if (cable.winch)
+        for (const WinchStageKeys& stage : cable.winch->stages)
+          length = std::min(length, stage.length);
+      if (i == id) square = vehicle.total_mass() * vehicle.gravity / (vehicle.quad_mass * length);
+      const Eigen::Array3d squares = cable.attachment.array().square();
+      if (keys.load_inertia)
+        turning.array() += vehicle.load_mass * vehicle.gravity / keys.load_inertia->array() *
+                           ((squares.sum() - squares) / length + std::abs(cable.attachment.z()));
+    }
+    return std::sqrt(square + turning.maxCoeff());
+  }
+
   void check(const config::Scenario& scenario, const config::Places& places) const override {
     const auto& keys = scenario.plant.own.get<CablesKeys>();
     const std::size_t count = scenario.vehicles.size();

@@ -19,9 +19,22 @@ class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> 
     return make_shape(keys.rotors, keys.attachment);
   }
 
+  double calc_swing_rate(const config::Scenario& scenario, std::uint32_t id) const override {
+    const auto& keys = scenario.plant.own.get<MultirotorKeys>();
+    const model::SlungLoadParameters vehicle = make_vehicle_scenario(scenario, id).vehicle;
+    const double rod = keys.rod ? keys.rod->mass : 0.0, mass = vehicle.load_mass + rod;
+    const double moment =
+        vehicle.load_mass * vehicle.rod_length + (keys.rod ? rod * keys.rod->centre : 0.0);
+    const double arm = keys.attachment.norm(), inertia = keys.inertia.minCoeff();
+    const double mobility = 1.0 / vehicle.quad_mass + arm * arm / inertia;
+    return std::sqrt(mass * vehicle.gravity *
+                     ((1.0 / mass + mobility) * mass / moment + arm / inertia));
+  }
+
   void check(const config::Scenario& scenario, const config::Places& places) const override {
     const auto& keys = scenario.plant.own.get<MultirotorKeys>();
     check_airframe(keys, places);
+    check_rod_angles(scenario.plant, places);
     check_pendulum(keys, places);
     for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id)
       check_vehicle(keys, config::make_vehicle_scenario(scenario, id).vehicle,

@@ -7,8 +7,8 @@
  * Frame: x forward, y right, z down. SI units, radians. Paths are relative to the scenario file.
  * There is one plant per vehicle. Calls of different plants come on different threads; calls of one
  * plant never overlap. A flight must depend only on the setup and the sequence of forces, not on
- * how the steps are split into calls of `advance`. Do not change the floating-point mode: link
- * without -ffast-math. */
+ * how the steps are split into calls of `advance`. Do not change the floating-point mode
+ * (link without -ffast-math), the locale, the working folder or the umask. */
 #ifndef SLS_PLANT_H
 #define SLS_PLANT_H
 

@@ -9,6 +9,7 @@ namespace {
 class SlungLoadOwnKeys : public config::OwnKeys<config::Plant, SlungLoadKeys> {
   /// With `rigid` a vehicle must have the masses and length of the published links.
   void check(const config::Scenario& scenario, const config::Places& places) const override {
+    check_rod_angles(scenario.plant, places);
     if (scenario.plant.own.get<SlungLoadKeys>().pendulum != Pendulum::kRigid) return;
     const auto check_one = [&](const std::string& place, const model::SlungLoadParameters& flown) {
       if (const auto contradiction = find_rigid_contradiction(flown))

@@ -58,6 +58,16 @@ TEST(LogTest, BracesInATextAreNotAFormat) {
             "x: error: got {} and {1}\n");
 }
 
+TEST(LogTest, TextsOfOthersCannotControlTheTerminal) {
+  start_log("x", "info");
+  const auto log = [](const std::string& text) { return capture([&] { spdlog::info(text); }).err; };
+  EXPECT_EQ(log("a\x1b[2J\r\n\t\x7f"), "x: a\\x1b[2J\\x0d\\x0a\\x09\\x7f\n");
+  EXPECT_EQ(log("C1 \xc2\x80 \xc2\x9b \x9b"), "x: C1 \\xc2\\x80 \\xc2\\x9b \\x9b\n");
+  EXPECT_EQ(log("\u202E\u2066 \xe2\x80"), "x: \\xe2\\x80\\xae\\xe2\\x81\\xa6 \\xe2\\x80\n");
+  EXPECT_EQ(log("π µs, \u00a0 … 機 🚁"), "x: π µs, \u00a0 … 機 🚁\n");
+  EXPECT_EQ(capture([] { print("a\x1b\nb"); }).out, "a\\x1b\\x0ab\n");
+}
+
 TEST(LogTest, ALaterStartReplacesTheEarlier) {
   start_log("first", "debug");
   start_log("second", "info");

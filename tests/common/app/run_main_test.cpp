@@ -1,13 +1,19 @@
 // Exit code and output on stderr and stdout of each outcome.
 #include "common/app/run_main.hpp"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
+#include <cerrno>
 #include <csignal>
 #include <cstdlib>
+#include <new>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
+#include <thread>
 #include <vector>
 
 #include "common/config/config_error.hpp"
@@ -194,6 +200,37 @@ class RunMainDeathTest : public testing::Test {
  protected:
   void SetUp() override { GTEST_FLAG_SET(death_test_style, "threadsafe"); }
 };
+
+/// Runs `work` in this process and ends it with the exit code.
+void run_and_exit(const std::function<void()>& work) {
+  char name[] = "program";
+  char* argv[] = {name};
+  CLI::App cli;
+  std::exit(run_main(1, argv, cli, {}, "program", work));
+}
+
+TEST_F(RunMainDeathTest, AFileIsNeverOpenedUnderTheNumberOfAClosedStandardStream) {
+  EXPECT_EXIT(
+      {
+        for (const int number : {0, 1, 2}) ::close(number);
+        run_and_exit([] { std::_Exit(::open("/dev/null", O_RDONLY)); });
+      },
+      testing::ExitedWithCode(3), "");
+}
+
+TEST_F(RunMainDeathTest, ALimitOfTheSystemIsNamedInWhateverThreadItIsMet) {
+  const auto no_thread = [] {
+    throw std::system_error(EAGAIN, std::generic_category(), "Resource temporarily unavailable");
+  };
+  const auto no_memory = [] { throw std::bad_alloc(); };
+  EXPECT_EXIT(run_and_exit(no_thread), testing::ExitedWithCode(kExitRunFailed),
+              "^program: error: expected another thread, got none[^\n]*\n$");
+  EXPECT_EXIT(run_and_exit(no_memory), testing::ExitedWithCode(kExitRunFailed),
+              "^program: error: expected more memory, got none[^\n]*\n$");
+  EXPECT_EXIT(run_and_exit([&] { std::thread(no_memory).join(); }),
+              testing::ExitedWithCode(kExitRunFailed),
+              "^program: error: expected more memory, got none[^\n]*\n$");
+}
 
 TEST_F(RunMainDeathTest, InterruptedIs130And143HoweverTheWorkEnds) {
   const auto end_well = [] {};

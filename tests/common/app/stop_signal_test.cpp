@@ -38,8 +38,23 @@ TEST_F(StopSignalDeathTest, NoSignalIsReportedBeforeTheFirst) {
   expect_exit(0, [] {});
 }
 
-TEST_F(StopSignalDeathTest, InterruptAndTerminateSetTheFlagOnly) {
-  for (const int number : {SIGINT, SIGTERM}) expect_exit(number, [&] { std::raise(number); });
+TEST_F(StopSignalDeathTest, StopSignalsSetTheFlagOnlyAlsoIfTheyWereBlocked) {
+  for (const int number : {SIGINT, SIGTERM, SIGHUP})
+    expect_exit(number, [&] {
+      sigset_t all;
+      sigfillset(&all);
+      pthread_sigmask(SIG_BLOCK, &all, nullptr);
+      install_stop_signals();
+      std::raise(number);
+    });
+}
+
+TEST_F(StopSignalDeathTest, AHangUpIgnoredAtTheStartStaysIgnored) {
+  expect_exit(0, [] {
+    std::signal(SIGHUP, SIG_IGN);
+    install_stop_signals();
+    std::raise(SIGHUP);
+  });
 }
 
 TEST_F(StopSignalDeathTest, TheFirstSignalCounts) {

@@ -2,8 +2,12 @@
 // process: every test here uses the shipped default.
 #include "common/bus/node.hpp"
 
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <filesystem>
@@ -13,6 +17,7 @@
 #include <set>
 #include <vector>
 
+#include "common/bus/fastdds/guarded_transports.hpp"
 #include "common/config/config_error.hpp"
 #include "fastcdr_api.hpp"
 #include "fastdds_api.hpp"
@@ -278,9 +283,14 @@ std::string find_error(const std::filesystem::path& file, int domain) {
   return sls::test::find_error<config::ConfigError>([&] { Node(file, domain, "test"); });
 }
 
+/// A file of shared memory port `port` in /dev/shm.
+std::string name_port(std::uint32_t port) {
+  return std::string("/dev/shm/") + kSharedMemoryPrefix + "port" + std::to_string(port);
+}
+
 TEST(NodeTest, NodesWithoutSharedMemoryJoinBesideThePortOfAKilledProcess) {
-  const std::string stale = std::string("/dev/shm/") + kSharedMemoryPrefix + "port" +
-                            std::to_string(7410 + 250 * own_domain()) + "_el";
+  const auto port = static_cast<std::uint32_t>(7410 + 250 * own_domain());
+  const std::string stale = name_port(make_memory_port(port)) + "_el";
   std::ofstream(stale) << "";
   const Node first(kQosFile, own_domain(), "first", "", Transports::kNetwork);
   EXPECT_NO_THROW(Node(kQosFile, own_domain(), "second", "", Transports::kNetwork));
@@ -291,8 +301,8 @@ TEST(NodeTest, NodesWithoutSharedMemoryJoinBesideThePortOfAKilledProcess) {
 TEST(NodeTest, ANodeBesideThePortOfAKilledProcessSparesTheIdsOfItsProcess) {
   const sls::test::OwnDomain other;
   Node first(kQosFile, own_domain(), "first");
-  const std::string stale = std::string("/dev/shm/") + kSharedMemoryPrefix + "port" +
-                            std::to_string(7410 + 250 * other.number() + 20) + "_el";
+  const auto port = static_cast<std::uint32_t>(7410 + 250 * other.number() + 20);
+  const std::string stale = name_port(make_memory_port(port)) + "_el";
   std::ofstream(stale) << "";
   EXPECT_NO_THROW(Node(kQosFile, other.number(), "second"));
   std::filesystem::remove(stale);
@@ -300,6 +310,54 @@ TEST(NodeTest, ANodeBesideThePortOfAKilledProcessSparesTheIdsOfItsProcess) {
   Writer<States> writer(third);
   Listener<States> listener(first, kLoopReaderProfile, third);
   EXPECT_TRUE(wait_until([&] { return listener.is_matched(); }));
+}
+
+TEST(NodeTest, PortsOfAnotherBuildAndUnfinishedOnesAreNotOpened) {
+  const sls::test::OwnDomain domain;
+  const auto first = static_cast<std::uint32_t>(7410 + 250 * domain.number());
+  std::string other_layout(60'000, '\x5a');
+  other_layout.replace(0, 4, std::string("\2\0\0\0", 4));  // it says that it is finished
+  std::vector<std::string> files;
+  for (std::uint32_t port = first - 10; port < first + 4; ++port) {
+    files.push_back(name_port(port));
+    std::ofstream(files.back()) << other_layout;
+    if (port < first) continue;
+    files.push_back(name_port(make_memory_port(port)));
+    std::ofstream(files.back()) << (port % 2 == 0 ? std::string(60'000, '\0') : "");
+  }
+  {
+    Node near(kQosFile, domain.number(), "near"), far(kQosFile, domain.number(), "far");
+    Writer<States> writer(near);
+    Listener<States> listener(far, kLoopReaderProfile, near);
+    EXPECT_TRUE(wait_until([&] { return is_matched(writer, far) && listener.is_matched(); }));
+    writer.write(make_message<States>(1));
+    EXPECT_TRUE(wait_until([&] { return listener.count() == 1; }));
+  }
+  for (const std::string& file : files) std::filesystem::remove(file);
+}
+
+TEST(NodeTest, ADatagramThatTheMiddlewareAssertsAboutDisturbsNothing) {
+  const sls::test::OwnDomain domain;
+  Node near(kQosFile, domain.number(), "near"), far(kQosFile, domain.number(), "far");
+  std::string datagram(
+      "RTPS\2\3\1\17"
+      "another host");
+  const std::string statistics = std::string("\x80\1\x38\0", 4) + std::string(56, '\0');
+  datagram += statistics + std::string("\1\1\0\0", 4);
+  const int socket = ::socket(AF_INET, SOCK_DGRAM, 0);
+  for (const int port : {0, 10, 11, 12, 13})
+    for (const char* address : {"127.0.0.1", "239.255.0.1"}) {
+      sockaddr_in to{};
+      to.sin_family = AF_INET;
+      to.sin_port = htons(static_cast<std::uint16_t>(7400 + 250 * domain.number() + port));
+      ::inet_pton(AF_INET, address, &to.sin_addr);
+      ::sendto(socket, datagram.data(), datagram.size(), 0, reinterpret_cast<sockaddr*>(&to),
+               sizeof to);
+    }
+  ::close(socket);
+  Writer<States> writer(near);
+  Listener<States> listener(far, kLoopReaderProfile, near);
+  EXPECT_TRUE(wait_until([&] { return is_matched(writer, far) && listener.is_matched(); }));
 }
 
 TEST(NodeErrorTest, ADomainOutOfRangeIsRefusedWithItsRange) {

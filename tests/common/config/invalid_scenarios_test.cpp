@@ -91,7 +91,7 @@ TEST_F(UnusableFileTest, UnreadableFile) {
   if (is_root) {
     ASSERT_EQ(seteuid(0), 0);
   }
-  EXPECT_EQ(message, file.string() + ": expected a readable file, got Permission denied");
+  EXPECT_EQ(message, file.string() + ": expected a scenario file, got Permission denied");
 }
 
 TEST(InvalidTextTest, NamesTheSenderWhereTextCameOverTheWire) {

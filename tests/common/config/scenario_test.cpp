@@ -37,6 +37,14 @@ TEST(ScenarioTest, ReadsTheExampleOfTheDesign) {
   EXPECT_EQ(scenario.text, kDesignExample);
 }
 
+TEST(ScenarioTest, WarnsOfAStepThatDampsTheSwing) {
+  std::string text = replace_once(kDesignExample, "rod_length_m: 1.0", "rod_length_m: 0.01");
+  text = replace_once(text, "step_s: 0.001", "step_s: 0.01");
+  EXPECT_EQ(parse_scenario(replace_once(text, "period_s: 0.004", "period_s: 0.02"), "file").warning,
+            "file:5: plant.step_s: expected at most 0.007501 for a swing of 33.3 rad/s, got 0.01: "
+            "100 swings lose 3.5 % of their energy");
+}
+
 /// The scenario of `kEveryKey`.
 Scenario make_every_key() {
   Scenario scenario;

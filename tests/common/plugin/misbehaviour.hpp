@@ -1,10 +1,13 @@
 /// Errors that the tests' libraries make in any of their functions.
 #pragma once
 
+#include <locale.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cfenv>
 #include <cstdlib>
+#include <locale>
 #include <stdexcept>
 #include <string>
 
@@ -39,6 +42,11 @@ inline void misbehave(const std::string& how) {
   if (how == "overflow the stack") overflow_stack(0);
   if (how == "hang")
     while (true) ::pause();
+  if (how == "set locale") ::setlocale(LC_NUMERIC, "C.UTF-8");
+  if (how == "set locale of streams") std::locale::global({std::locale(), new std::numpunct<char>});
+  if (how == "use locale") ::uselocale(LC_GLOBAL_LOCALE);
+  if (how == "change folder" && ::chdir("/") != 0) std::abort();
+  if (how == "change mask") ::umask(0177);
   if (how == "round up") std::fesetround(FE_UPWARD);
 #if defined(__x86_64__)
   if (how == "flush to zero") __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8000);

@@ -186,7 +186,10 @@ def test_the_verdict_names_what_a_controller_did(check, impatient, monkeypatch, 
         return
     page = (tmp_path / "pages/check-shm/report.html").read_text()
     assert expected.partition(",")[0].replace("'", "&#x27;") in page and "Output of the programs" in page
-    assert (tmp_path / "pages/index.html").is_file()
+    assert re.search('class="badge (.*?)<', page)[1] == 'bad">not held'
+    index = (tmp_path / "pages/index.html").read_text()
+    assert "<h1>Checks</h1>" in index and "1 flight: 1 not held" in index and "badge bad" in index, index
+    assert "<th>verdict</th>" in index and expected.partition(",")[0].replace("'", "&#x27;") in index
 
 
 @pytest.mark.parametrize("controller, expected", [

@@ -224,7 +224,9 @@ def test_junit_and_json_have_one_entry_for_each_flight(tmp_path, flown):
     assert [suite.get("name") for suite in root] == ["one", "two"]
     failed, passed = root[0].findall("testcase")
     assert failed.get("classname") == "one" and failed.get("name") == "shm" and float(failed.get("time")) == 0
-    assert failed.find("failure").get("message") == "controller: ?[1m<killed> & \"gone\""
+    assert failed.find("failure").get("message") == "one.yaml: controller: ?[1m<killed> & \"gone\""
+    assert root[1].find("testcase/error").get("message") == "two.yaml:1: no"
+    assert {key for case in root.iter("testcase") for key in case.attrib} == {"classname", "name", "time"}  # Ant's
     assert "server: a?" in failed.find("system-err").text and len(passed) == 0
     data = json.loads((tmp_path / "out/json.json").read_text())
     assert data["exit_code"] == 2 and [one["verdict"] for one in data["flights"]] == ["not held", "held", "unusable"]

@@ -134,6 +134,12 @@ TEST(DiagnosisTest, AProgramThatAnswersNoHandshakeRejectsUs) {
   endpoint.participant = seen.programs.front().id;
   seen.endpoints = {endpoint};
   EXPECT_EQ(list_findings(seen), Names{});
+  seen.settings.expiry = "key/certificate.pem ends";
+  EXPECT_EQ(list_findings(seen), Names{}) << "until then it flies";
+  const auto checks = diagnose(seen);
+  EXPECT_TRUE(std::any_of(checks.begin(), checks.end(), [](const Check& check) {
+    return check.text == "all programs have a valid identity; key/certificate.pem ends";
+  }));
   seen.programs.front().is_secured = false;
   EXPECT_EQ(list_findings(seen), Names{"security"});
 }

@@ -229,8 +229,10 @@ void PageSession::receive(MessageKind kind, std::string_view text) {
 void PageSession::authenticate(const Message& message) {
   const auto token = find_text(message, "token");
   if (!token) return refuse("token: expected text");
-  if (!connection_.authenticate(*token)) refuse("token: expected that of --token-file");
-  send_hello();
+  connection_.authenticate(*token, [this](bool is_right) {
+    if (!is_right) refuse("token: expected that of --token-file");
+    send_hello();
+  });
 }
 
 void PageSession::select(const Message& message) {

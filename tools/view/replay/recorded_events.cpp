@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "common/text/regular_file.hpp"
 #include "recorder/sinks/csv/csv_reader.hpp"
 
 namespace sls::view {
@@ -51,7 +52,12 @@ void read_status(const fs::path& folder, double period_s, std::vector<RecordedEv
 void read_flight_log(const fs::path& folder, double period_s, std::vector<RecordedEvent>& events) {
   std::set<std::pair<std::uint64_t, std::string>> known;
   for (const RecordedEvent& event : events) known.emplace(event.step, event.text);
-  std::ifstream stream(folder / "flight.txt", std::ios::binary);
+  std::ifstream stream;
+  try {
+    stream = text::open_regular_file(folder / "flight.txt");
+  } catch (const text::NoRegularFile&) {
+    return;
+  }
   bool is_event = false;
   std::string line;
   for (; std::getline(stream, line) && events.size() < 2 * kMostMarks;) {

@@ -221,6 +221,20 @@ bool is_same_token(std::string_view given, std::string_view expected) {
   return ::CRYPTO_memcmp(a.data(), b.data(), a.size()) == 0;
 }
 
+TokenTries::Clock::duration TokenTries::find_wait(const std::string& network,
+                                                  Clock::time_point now) const {
+  const auto found = until_.find(network);
+  return found == until_.end() ? -kInterval : found->second - (kFree - 1) * kInterval - now;
+}
+
+void TokenTries::note_wrong(const std::string& network, Clock::time_point now) {
+  for (auto at = until_.begin(); at != until_.end();)
+    at = at->second <= now ? until_.erase(at) : std::next(at);
+  if (until_.size() >= kMostNetworks) until_.erase(until_.begin());
+  auto& until = until_.emplace(network, now).first->second;
+  until += kInterval;
+}
+
 std::string load_token(const std::string& path) {
   const std::string line = read_first_line(path);
   const std::string expected = fmt::format("{} to {} printable characters without spaces in line 1",

@@ -1,6 +1,8 @@
 /// Permissions to view and to operate. Pure: no network.
 #pragma once
 
+#include <chrono>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -43,6 +45,23 @@ Access judge(const RequestOrigin& request, const AccessOptions& options);
 
 /// Compares in a time that does not depend on the place of the first difference.
 bool is_same_token(std::string_view given, std::string_view expected);
+
+/// Slows guesses of the token: after `kFree` wrong ones a network gets one try each `kInterval`, on
+/// however many connections.
+class TokenTries {
+ public:
+  using Clock = std::chrono::steady_clock;
+  static constexpr int kFree = 5;
+  static constexpr std::chrono::seconds kInterval{1};
+  static constexpr std::size_t kMostNetworks = 1000;
+
+  /// Time until a token from `network` may be judged; at most 0 if it may be now.
+  Clock::duration find_wait(const std::string& network, Clock::time_point now) const;
+  void note_wrong(const std::string& network, Clock::time_point now);
+
+ private:
+  std::map<std::string, Clock::time_point> until_;  ///< its wrong tokens are forgotten
+};
 
 /// The token of --token-file: its first line. @throws config::ConfigError: expected a file of mode
 /// 0600 or stricter whose first line has 16 to 256 printable characters.

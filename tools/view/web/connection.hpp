@@ -41,8 +41,9 @@ class Connection {
   virtual bool may_operate() const = 0;
   virtual std::string why_not() const = 0;
 
-  /// Checks the token with which a page was opened; true if it is correct.
-  virtual bool authenticate(std::string_view token) = 0;
+  /// Checks the token with which a page was opened, after others have guessed wrong later; passes
+  /// true to `judged` if it is correct.
+  virtual void authenticate(std::string_view token, std::function<void(bool)> judged) = 0;
 
   /// Sends the queued messages, then closes with a WebSocket close code (1008: policy) and reason.
   virtual void close(std::uint16_t code, const std::string& reason) = 0;

@@ -154,7 +154,11 @@ void HttpSession::answer() {
     origin.origin = std::string(request[http::field::origin]);
   const Access access = judge(origin, hub_.access);
   if (!access.may_look) return refuse(http::status::forbidden, access.reason);
-  if (websocket::is_upgrade(request) && target->path == "/") return upgrade(origin, access);
+  if (websocket::is_upgrade(request) && target->path == "/") {
+    if (!target->token || !hub_.access.token) return upgrade(origin);
+    deadline_.cancel();
+    return hub_.judge_token(weak_from_this(), [this, origin] { upgrade(origin); });
+  }
   if (request.method() != http::verb::get && request.method() != http::verb::head)
     return refuse(http::status::method_not_allowed, "expected GET or HEAD");
   const auto resource = hub_.resources.find(target->path);
@@ -163,7 +167,7 @@ void HttpSession::answer() {
   serve(resource->second);
 }
 
-void HttpSession::upgrade(const RequestOrigin& origin, const Access& access) {
+void HttpSession::upgrade(const RequestOrigin& origin) {
   const Request request = parser_->get();
   const auto choice = choose_protocol(request, hub_.protocols);
   if (!choice)
@@ -174,8 +178,8 @@ void HttpSession::upgrade(const RequestOrigin& origin, const Access& access) {
   if (buffer_.size() != 0)
     return refuse(http::status::bad_request, "expected no frames before the answer");
   deadline_.cancel();
-  const auto connection =
-      std::make_shared<WebSocketConnection>(hub_, std::move(socket_), origin, access);
+  const auto connection = std::make_shared<WebSocketConnection>(hub_, std::move(socket_), origin,
+                                                                judge(origin, hub_.access));
   hub_.add(connection);
   hub_.remove(this);
   connection->accept(request, *choice->protocol, choice->name);

@@ -28,7 +28,7 @@ class HttpSession : public Client, public std::enable_shared_from_this<HttpSessi
   void note_request(Error error);
   void refuse_malformed(Error error);
   void answer();
-  void upgrade(const RequestOrigin& origin, const Access& access);
+  void upgrade(const RequestOrigin& origin);
   void serve(const Resource& resource);
   void refuse(http::status status, const std::string& reason);
   template <class Body>

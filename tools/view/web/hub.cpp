@@ -31,8 +31,9 @@ std::string name_network(const Socket& socket) {
   const net::ip::address address = unmap(socket.remote_endpoint(ignored).address());
   if (address.is_loopback()) return "loopback";
   if (address.is_v4()) return address.to_string();
-  const auto bytes = address.to_v6().to_bytes();
-  return {bytes.begin(), bytes.begin() + 8};
+  auto bytes = address.to_v6().to_bytes();
+  std::fill(bytes.begin() + 8, bytes.end(), 0);
+  return net::ip::address_v6(bytes).to_string() + "/64";
 }
 
 }  // namespace
@@ -88,6 +89,26 @@ void Hub::warn(const std::string& text) {
   if (now < next_warning_) return;
   next_warning_ = now + kWarningInterval;
   spdlog::warn("{}", quote(text));
+}
+
+void Hub::judge_token(const std::weak_ptr<Client>& client, std::function<void()> judge) {
+  const auto owner = client.lock();
+  if (!owner) return;
+  const auto wait = tries_.find_wait(owner->address, TokenTries::Clock::now());
+  if (wait <= wait.zero()) return judge();
+  const auto timer = std::make_shared<Timer>(io.get_executor(), wait);
+  timer->async_wait([this, timer, client, judge = std::move(judge)](Error) mutable {
+    judge_token(client, std::move(judge));
+  });
+}
+
+void Hub::note_wrong_token(const std::string& network) {
+  const auto now = TokenTries::Clock::now();
+  tries_.note_wrong(network, now);
+  ++wrong_tokens_;
+  if (now < next_token_warning_) return;
+  next_token_warning_ = now + kWarningInterval;
+  spdlog::warn("wrong token from {} (wrong ones since the start: {})", network, wrong_tokens_);
 }
 
 void Hub::add(std::shared_ptr<Client> client) {

@@ -19,8 +19,8 @@ class Client {
  public:
   explicit Client(const Socket& socket);
   virtual ~Client() = default;
-  /// The network of the client: its IPv4 address, the first 64 bits of its IPv6 address, or
-  /// "loopback".
+  /// The network of the client: its IPv4 address, the first 64 bits of its IPv6 address
+  /// ("fe80::/64"), or "loopback".
   const std::string address;
   std::uint64_t number = 0;  ///< ascending in order of arrival
 
@@ -61,6 +61,11 @@ class Hub {
   /// Logs a problem of a client, at most every 10 s, because clients must not fill the log.
   void warn(const std::string& text);
 
+  /// Calls `judge` when a token of `client` may be judged, unless its connection ends before.
+  void judge_token(const std::weak_ptr<Client>& client, std::function<void()> judge);
+  /// Logs wrong tokens, at most every 10 s.
+  void note_wrong_token(const std::string& network);
+
   /// Shuts all down and calls `done` once they have ended.
   void shut_down(std::function<void()> done);
   void drop_all();
@@ -71,7 +76,9 @@ class Hub {
   std::unordered_map<Client*, std::shared_ptr<Client>> clients_;
   std::uint64_t next_number_ = 1;
   std::function<void()> done_;
-  std::chrono::steady_clock::time_point next_warning_;
+  std::chrono::steady_clock::time_point next_warning_, next_token_warning_;
+  TokenTries tries_;
+  std::uint64_t wrong_tokens_ = 0;
 };
 
 }  // namespace sls::view

@@ -30,8 +30,10 @@ WebSocketConnection::WebSocketConnection(Hub& hub, Socket socket, const RequestO
       stream_(GatheringStream(std::move(socket))),
       close_timer_(stream_.get_executor()),
       queue_(hub.limits.queue_bytes) {
-  if (origin.token && hub.access.token && !is_same_token(*origin.token, *hub.access.token))
+  if (origin.token && hub.access.token && !is_same_token(*origin.token, *hub.access.token)) {
     ++wrong_tokens_;
+    hub.note_wrong_token(address);
+  }
 }
 
 WebSocketConnection::~WebSocketConnection() = default;
@@ -84,7 +86,7 @@ void WebSocketConnection::note_read(Error error) {
   if (error || has_ended_) return drop();
   if (!close_reason_) receive();
   buffer_.consume(buffer_.size());
-  read();
+  if (!is_judging_) read();
 }
 
 void WebSocketConnection::receive() {
@@ -98,14 +100,29 @@ void WebSocketConnection::receive() {
   }
 }
 
-bool WebSocketConnection::authenticate(std::string_view token) {
-  if (access_.may_operate) return true;
+void WebSocketConnection::authenticate(std::string_view token, std::function<void(bool)> judged) {
+  if (access_.may_operate) return judged(true);
+  is_judging_ = true;
+  const auto is_late = std::make_shared<bool>(false);
+  hub_.judge_token(weak_from_this(),
+                   [this, is_late, judged = std::move(judged), token = std::string(token)] {
+                     is_judging_ = false;
+                     if (has_ended_) return;
+                     judged(judge_token(token));
+                     if (*is_late) read();
+                   });
+  *is_late = true;
+}
+
+bool WebSocketConnection::judge_token(std::string_view token) {
   RequestOrigin request = origin_;
   request.token = token;
   access_ = judge(request, hub_.access);
-  if (hub_.access.token && !is_same_token(token, *hub_.access.token) &&
-      ++wrong_tokens_ >= kMostWrongTokens)
-    close(websocket::close_code::policy_error, "too many wrong tokens");
+  if (hub_.access.token && !is_same_token(token, *hub_.access.token)) {
+    hub_.note_wrong_token(address);
+    if (++wrong_tokens_ >= kMostWrongTokens)
+      close(websocket::close_code::policy_error, "too many wrong tokens");
+  }
   return access_.may_operate;
 }
 

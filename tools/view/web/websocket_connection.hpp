@@ -34,7 +34,7 @@ class WebSocketConnection : public Connection,
   std::uint64_t dropped() const override { return queue_.dropped(); }
   bool may_operate() const override { return access_.may_operate; }
   std::string why_not() const override { return access_.reason; }
-  bool authenticate(std::string_view token) override;
+  void authenticate(std::string_view token, std::function<void(bool)> judged) override;
   void close(std::uint16_t code, const std::string& reason) override;
 
   std::size_t waiting_bytes() const override { return queue_.cost(); }
@@ -48,6 +48,7 @@ class WebSocketConnection : public Connection,
   void read();
   void note_read(Error error);
   void receive();
+  bool judge_token(std::string_view token);
   void write_next();
   /// Call it after each change of `queue_`.
   void count_waiting();
@@ -66,7 +67,8 @@ class WebSocketConnection : public Connection,
   std::optional<QueuedMessage> leaving_;
   std::unique_ptr<Session> session_;
   std::optional<websocket::close_reason> close_reason_;  ///< to be sent after the queue
-  bool is_open_ = false;                                 ///< the upgrade is answered
+  bool is_judging_ = false;  ///< a token waits; nothing is read meanwhile
+  bool is_open_ = false;     ///< the upgrade is answered
   bool is_close_sent_ = false;
   bool has_ended_ = false;
   int wrong_tokens_ = 0;

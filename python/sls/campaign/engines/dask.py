@@ -14,6 +14,7 @@ from sls.campaign.engines.cluster import describe_rest, find_missing, find_place
 from sls.campaign.folder import CampaignFolder
 from sls.campaign.progress import Progress
 from sls.input_error import InputError
+from sls.launcher.place import escape_controls
 
 CHUNK_S = 5.0            # work in a chunk, s
 MOST_TRIES = 3           # tries of a chunk after errors that may be temporary
@@ -24,7 +25,7 @@ START = "start one with `dask-scheduler`, and on each machine `dask-worker ADDRE
 
 
 def say(text: str) -> None:
-    print(f"sls: dask: {text}", file=sys.stderr, flush=True)
+    print(f"sls: dask: {escape_controls(text)}", file=sys.stderr, flush=True)
 
 
 def make_task() -> Any:

@@ -21,6 +21,7 @@ from sls.campaign.folder import COLLECT_JOB, CampaignFolder, DamagedChunk
 from sls.campaign.progress import Progress
 from sls.campaign.whole_files import write_whole
 from sls.input_error import InputError
+from sls.launcher.place import escape_controls
 
 CHUNK_S = 60.0         # work in a chunk, s
 TASK_S = 60.0          # least work in a task, s, because Slurm starts only a few tasks per second
@@ -60,7 +61,7 @@ def to_one_line(text: str) -> str:
 
 
 def say(text: str) -> None:
-    print(f"sls: slurm: {text}", file=sys.stderr, flush=True)
+    print(f"sls: slurm: {escape_controls(text)}", file=sys.stderr, flush=True)
 
 
 def name_job(folder: CampaignFolder) -> str:

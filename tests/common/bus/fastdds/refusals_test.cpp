@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 #include <spdlog/sinks/ostream_sink.h>
 #include <spdlog/spdlog.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <sstream>
@@ -62,7 +64,14 @@ TEST_F(RefusalsTest, AreAlsoReadFromTheLogAlone) {
 
 TEST_F(RefusalsTest, AParticipantWithoutProofIsReportedInTime) {
   refusals_.note_discovered("01.0f", "'accepted'", "'CN=controller'");
-  refusals_.note_discovered("02.0f", "'silent'", "'CN=recorder' of 'CN=another'");
+  const pid_t killed = ::fork();
+  if (killed == 0) ::_exit(0);
+  std::string process = Refusals::name_process();
+  refusals_.note_discovered(
+      "04.0f", "'killed'", "'CN=recorder'",
+      process.replace(process.rfind(' ') + 1, process.npos, std::to_string(killed)));
+  refusals_.note_discovered("02.0f", "'silent'", "'CN=recorder' of 'CN=another'",
+                            Refusals::name_process());
   refusals_.note_accepted("01.0f");
   refusals_.note_accepted("03.0f");  // Fast DDS 3 tells both in this order
   refusals_.note_discovered("03.0f", "'accepted first'", "'CN=recorder'");
@@ -70,6 +79,7 @@ TEST_F(RefusalsTest, AParticipantWithoutProofIsReportedInTime) {
   EXPECT_EQ(said_.str(),
             "refused 'silent': no proof of an identity that holds here within 5 s; it claims "
             "'CN=recorder' of 'CN=another'\n");
+  ::waitpid(killed, nullptr, 0);
 }
 
 TEST_F(RefusalsTest, AFloodOfThemIsFiveLines) {

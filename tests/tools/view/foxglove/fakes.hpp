@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -44,7 +45,7 @@ class FakeConnection final : public Connection {
   std::uint64_t dropped() const override { return dropped_messages; }
   bool may_operate() const override { return is_operator; }
   std::string why_not() const override { return is_operator ? "" : "expected a token"; }
-  bool authenticate(std::string_view) override { return false; }
+  void authenticate(std::string_view, std::function<void(bool)>) override {}
   void close(std::uint16_t code, const std::string&) override { close_code = code; }
 
   /// The text messages of `op`, in order.

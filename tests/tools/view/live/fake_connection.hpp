@@ -31,10 +31,9 @@ class FakeConnection : public view::Connection {
   std::uint64_t dropped() const override { return 0; }
   bool may_operate() const override { return obstacle.empty(); }
   std::string why_not() const override { return obstacle; }
-  bool authenticate(std::string_view token) override {
-    if (token != "the right token") return false;
-    obstacle.clear();
-    return true;
+  void authenticate(std::string_view token, std::function<void(bool)> judged) override {
+    if (token == "the right token") obstacle.clear();
+    judged(token == "the right token");
   }
   void close(std::uint16_t code, const std::string&) override { close_code = code; }
 

@@ -60,8 +60,8 @@ async function stepOn(page, count) {
 }
 
 /** The recorded positions of quadrotor and load at `step`; nothing if that row is not on the disk yet. */
-function readRecorded(step) {
-  const [header, ...rows] = readFileSync(join(flight.folder, "recording/state.csv"), "utf8").trimEnd().split("\n").map((line) => line.split(","));
+function readRecorded(step, { folder } = flight) {
+  const [header, ...rows] = readFileSync(join(folder, "recording/state.csv"), "utf8").trimEnd().split("\n").map((line) => line.split(","));
   const row = rows.find((fields) => Number(fields[header.indexOf("step")]) === step);
   const read = (part) => ["x", "y", "z"].map((axis) => Number(row[header.indexOf(`${part}_${axis}_m`)]));
   return row && { quad: read("quad"), load: read("load") };
@@ -140,7 +140,7 @@ test("a connection that is lost is found again without reload, and the picture s
     const second = await flight.startViewer("--port", viewer.port);
     try {
       await untilFlies(page, step);
-      assert.doesNotMatch(await page.$eval("#banner", ({ hidden, textContent }) => (hidden ? "" : textContent)), /lost/);
+      assert.equal(await page.$eval("#banner", ({ hidden }) => hidden), true);
       assert.equal(await page.evaluate(() => window.isSamePage), true);
     } finally {
       await second.stop();
@@ -217,4 +217,25 @@ test("a phone shows everything without scrolling sideways, and every control has
       all.filter((item) => !(item.getAttribute("aria-label") || item.textContent.trim() || item.labels?.length)).length);
     assert.equal(nameless, 0);
   });
+});
+
+test("after the end of a flight the page replays it, also without sls_view", async () => {
+  const ended = await startFlight();
+  await withPage([], {}, async (page, { viewer }) => {
+    await untilFlies(page, 500);
+    await page.click("[data-action=stop]");
+    await page.click("#confirm-yes");
+    await waitFor("replay", () => page.$("#time"));
+    await viewer.stop();
+    assert.match(await page.$eval("#banner", ({ dataset, textContent }) => `${dataset.kind} ${textContent}`), /^note .*sls view/);
+    const { pose, step } = await page.evaluate(() => {
+      const { min, max } = document.getElementById("time");
+      const step = Math.round((Number(min) + Number(max)) / 2 / 0.004); // of a period of 4 ms
+      window.slsView.seek(step * 0.004);
+      return { pose: window.slsView.pose(0), step };
+    });
+    const recorded = readRecorded(step, ended);
+    for (const part of ["quad", "load"])
+      pose[part].slice(0, 3).forEach((value, axis) => assert.ok(Math.abs(value - recorded[part][axis]) < 1e-3, `${part} ${value}`));
+  }, { on: ended, expected: /WebSocket|ERR_CONNECTION/ }).finally(ended.stop);
 });

@@ -1,6 +1,7 @@
 #include "tools/view/replay/recorded_run.hpp"
 
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cmath>
 #include <sstream>
@@ -292,6 +293,9 @@ TEST_F(RecordedRunTest, DamageIsNamedInOneLine) {
             std::string::npos);
   EXPECT_EQ(damage("status.csv", remove), "none");  // no events
   EXPECT_EQ(damage("flight.txt", remove), "none");
+  EXPECT_EQ(damage("flight.txt",
+                   [](const fs::path& file) { fs::remove(file), ::mkfifo(file.c_str(), 0600); }),
+            "none");
   EXPECT_NE(damage("state.csv",
                    [](const fs::path& file) {
                      const std::string bytes = read_bytes(file);

@@ -201,6 +201,20 @@ TEST(AccessTest, ComparesTokensOfAnyLength) {
   EXPECT_FALSE(is_same_token(std::string(1 << 20, 'x'), kAccessToken));
 }
 
+TEST(AccessTest, AfterFiveWrongTokensANetworkGetsOneTryASecond) {
+  TokenTries tries;
+  const TokenTries::Clock::time_point begin{};
+  for (int i = 0; i < 5; ++i) {
+    EXPECT_LE(tries.find_wait("10.0.0.2", begin).count(), 0) << i;
+    tries.note_wrong("10.0.0.2", begin);
+  }
+  const std::chrono::seconds second(1);
+  EXPECT_EQ(tries.find_wait("10.0.0.2", begin), second);
+  EXPECT_LE(tries.find_wait("10.0.0.3", begin).count(), 0) << "another network";
+  tries.note_wrong("10.0.0.2", begin + second);
+  EXPECT_EQ(tries.find_wait("10.0.0.2", begin + second), second);
+}
+
 // --- options -------------------------------------------------------------------------------------
 
 TEST(AccessTest, AnotherAddressNeedsAToken) {

@@ -26,7 +26,9 @@ class Echo : public view::Session {
   void receive(view::MessageKind kind, std::string_view message) override {
     if (message == "may") return answer(connection_.may_operate() ? "yes" : connection_.why_not());
     if (message.substr(0, 6) == "token ")
-      return answer(connection_.authenticate(message.substr(6)) ? "right" : connection_.why_not());
+      return connection_.authenticate(message.substr(6), [this](bool is_right) {
+        answer(is_right ? "right" : connection_.why_not());
+      });
     if (message == "throw") throw std::runtime_error("as asked");
     if (message == "close") {
       for (const char* text : {"1", "2", "3"}) answer(text);

@@ -1,5 +1,9 @@
 /// WebSockets: negotiation, frames that break the protocol, permission to operate, the end.
 #include <gtest/gtest.h>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
+
+#include <sstream>
 
 #include "tests/support/waiting.hpp"
 #include "tests/tools/view/web/running_server.hpp"
@@ -244,6 +248,24 @@ TEST_F(WebSocketTest, ClosesAfterFiveWrongTokens) {
   for (int i = 0; i < 3; ++i) EXPECT_EQ(ask(client, "token wrong"), "wrong token");
   client.send(to_bytes({kText, "token wrong"}));
   EXPECT_EQ(client.read_close_code(), 1008);
+}
+
+TEST_F(WebSocketTest, WrongTokensOfManyConnectionsAreSlowedAndLogged) {
+  std::ostringstream log;
+  const auto before = spdlog::default_logger();
+  const auto sink = std::make_shared<spdlog::sinks::ostream_sink_mt>(log);
+  sink->set_pattern("%v");
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>("test", sink));
+  const auto begin = std::chrono::steady_clock::now();
+  for (int i = 0; i < 3; ++i) {
+    RawClient client = open("/?token=wrong");
+    EXPECT_EQ(ask(client, "token wrong"), "wrong token");
+  }
+  RawClient client = open(std::string("/?token=") + kToken);
+  EXPECT_EQ(ask(client, "may"), "yes");
+  EXPECT_GE(std::chrono::steady_clock::now() - begin, std::chrono::seconds(2));
+  spdlog::set_default_logger(before);
+  EXPECT_EQ(log.str(), "wrong token from loopback (wrong ones since the start: 1)\n");
 }
 
 // --- silence and the end -------------------------------------------------------------------------

@@ -1,9 +1,12 @@
 /** The page for a live flight: uses subprotocol sls.view.1 and reconnects. */
+import { find } from "./dom";
+import { History } from "./history";
 import { OperatorBar } from "./operator";
 import {
   addEvent, clearEvents, showBanner, showEmpty, showLink, showPhase, showRun, showStage, showStatus, showTime, type Latency,
 } from "./panels";
 import { readKind, readPoses, readRows, type Poses } from "./protocol";
+import { Replay } from "./replay/replay";
 import { makeShell, type Shell } from "./shell";
 import type { FlightEvent, Hello, Mark, NoRun, Reply, Run, Status } from "./types";
 
@@ -12,6 +15,7 @@ const kMostWait = 4000;
 const kPanelTime = 250;
 const kMostLatencies = 1000;
 const kMostMarks = 300;
+const kEndTime = 1000; // ms after a run has ended, in which its last rows come
 
 type Message =
   | ({ op: "hello" } & Hello)
@@ -46,6 +50,9 @@ class Live {
   private readonly bar: OperatorBar;
   private readonly channel = new MessageChannel();
   private readonly measured: number[] = [];
+  private history: History | null = null;
+  private panels = 0;
+  private isOver = false; // the page is a replay
 
   constructor(private readonly shell: Shell) {
     this.bar = new OperatorBar(
@@ -64,7 +71,7 @@ class Live {
     this.channel.port1.onmessage = () => this.noteDrawn();
     clearEvents();
     showPhase("connecting");
-    setInterval(() => this.showPanels(), kPanelTime);
+    this.panels = window.setInterval(() => this.showPanels(), kPanelTime);
     addEventListener("online", () => {
       this.wait = kFirstWait;
       this.retry();
@@ -81,7 +88,7 @@ class Live {
     socket.onopen = () => {
       this.wait = kFirstWait;
       showLink("open", "connected");
-      showBanner(null);
+      if (!this.isOver) showBanner(null);
       if (this.token) this.send({ op: "authenticate", token: this.token });
       if (this.run) this.send({ op: "select", vehicle_id: this.shell.selected() });
     };
@@ -92,6 +99,8 @@ class Live {
   private noteLost(socket: WebSocket, reason: string): void {
     if (socket !== this.socket) return;
     this.socket = null;
+    if (this.hasEnded()) this.becomeReplay();
+    if (this.isOver) return void setTimeout(() => this.retry(), kMostWait);
     showLink("lost", "not connected");
     const why = reason ? ` (${reason})` : "";
     const kept = this.run ? " The picture is the last one that came." : "";
@@ -109,11 +118,39 @@ class Live {
     if (this.socket?.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify(message));
   }
 
+  private hasEnded(): boolean {
+    return this.history !== null && /finished|failed/.test(this.status?.phase ?? "");
+  }
+
+  /** Shows what has come of a run that has ended. The next run is shown live, by a fresh page. */
+  private becomeReplay(): void {
+    if (this.isOver) return;
+    const { phase, reason, step } = this.status!;
+    const recording = this.history!.toRecording(reason ? `${phase}: ${reason}` : phase, step);
+    if (!recording) return;
+    this.isOver = true;
+    clearInterval(this.panels);
+    this.newest = null;
+    this.bar.setPhase("", 0, false);
+    find("bar").replaceChildren();
+    find("link").hidden = true;
+    new Replay(this.shell, [recording]);
+    showBanner(`The flight has ended. This replay has what the page received; ./sls view DIR shows the whole recording.`, "note");
+  }
+
   private receive(data: string | ArrayBuffer): void {
+    if (this.isOver) return this.awaitRun(data);
     if (typeof data === "string") return this.receiveText(JSON.parse(data) as Message);
     const kind = readKind(data);
     if (kind === 1) this.receivePoses(readPoses(data));
     else if (kind === 2) this.receiveRows(data);
+  }
+
+  private awaitRun(data: string | ArrayBuffer): void {
+    const message = typeof data === "string" ? (JSON.parse(data) as Message) : null;
+    if (message?.op !== "run" || message.run.run_id === this.run?.run_id) return;
+    if (this.token) location.hash = new URLSearchParams({ token: this.token }).toString();
+    location.reload();
   }
 
   private receiveText(message: Message): void {
@@ -130,6 +167,8 @@ class Live {
       case "status":
         this.status = { ...message, phase: message.phase.toLowerCase() };
         this.bar.setPhase(this.status.phase, this.status.step, true);
+        this.history?.addStage(this.status);
+        if (this.hasEnded()) setTimeout(() => this.hasEnded() && this.becomeReplay(), kEndTime);
         break;
       case "event":
         this.noteEvent(message);
@@ -142,8 +181,10 @@ class Live {
 
   private setRun(run: Run): void {
     showRun(run);
+    showBanner(null); // of no_run
     if (this.run?.run_id === run.run_id) return; // the same run after a reconnection
     this.run = run;
+    this.history = new History(run);
     this.status = null;
     this.newest = null;
     this.marks = [];
@@ -174,6 +215,7 @@ class Live {
     if (this.events.has(key)) return; // every connection sends the past events again
     this.events.add(key);
     addEvent(event);
+    this.history?.events.push(event);
     this.marks = [...this.marks.slice(1 - kMostMarks), { time: event.sim_time_s, text: event.text, kind: kindOf(event.text) }];
     this.shell.plots.setMarks(this.marks);
   }
@@ -181,12 +223,14 @@ class Live {
   private receivePoses(poses: Poses): void {
     if (poses.runId !== this.run?.run_id) return;
     this.newest = poses;
+    this.history?.addPoses(poses.simTime, poses.poses, this.shell.selected());
     this.shell.setPoses(poses.simTime, poses.poses);
   }
 
   private receiveRows(data: ArrayBuffer): void {
     const rows = readRows(data);
     if (rows.runId !== this.run?.run_id || rows.vehicleId !== this.shell.selected()) return;
+    this.history?.addRows(rows);
     this.shell.plots.append(rows);
   }
 

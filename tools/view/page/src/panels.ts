@@ -39,7 +39,7 @@ export function showLink(state: "open" | "lost" | "connecting", text: string): v
   link.dataset.state = state;
 }
 
-export function showBanner(text: string | null, kind: "bad" | "warn" = "bad"): void {
+export function showBanner(text: string | null, kind: "bad" | "warn" | "note" = "bad"): void {
   const banner = find("banner");
   banner.hidden = text === null;
   banner.dataset.kind = kind;
@@ -73,6 +73,7 @@ async function copyText(text: string, button: HTMLButtonElement): Promise<void> 
 interface Line {
   name: string;
   text: string;
+  title?: string;
   kind?: "warn" | "bad";
 }
 
@@ -84,6 +85,7 @@ export function showLines(lines: readonly Line[]): void {
     if (list.children.length <= 2 * index) list.append(make("dt"), make("dd"));
     const [term, value] = [list.children[2 * index] as HTMLElement, list.children[2 * index + 1] as HTMLElement];
     setText(term, name);
+    term.title = lines[index]!.title ?? "";
     setText(value, text);
     value.className = kind ?? "";
   });
@@ -107,7 +109,10 @@ export function showStatus(status: Status, run: Run | null, drawn: Latency, fps:
   add("Controller", status.controller);
   if (status.round_trip_p50_us > 0)
     add("Round trip", `p50 ${Math.round(status.round_trip_p50_us)} · p99 ${Math.round(status.round_trip_p99_us)} µs`);
-  if (drawn.count > 0) add("Published → drawn", `p50 ${drawn.p50.toFixed(0)} · p99 ${drawn.p99.toFixed(0)} ms · ${fps} frames/s`);
+  if (drawn.count > 0)
+    lines.push({
+      name: "Published → drawn", text: `p50 ${drawn.p50.toFixed(0)} · p99 ${drawn.p99.toFixed(0)} ms · ${fps} frames/s`,
+      title: "From when the server published a step until this page had drawn it; only valid on one machine" });
   const counters = Object.entries(status.counters).filter(([, value]) => value > 0);
   add("Counters", counters.map(([name, value]) => `${name.replaceAll("_", " ")} ${format(value)}`).join(" · "), "warn");
   showLines(lines);
@@ -128,7 +133,8 @@ function showParticipants(participants: readonly Participant[]): void {
   if (place.dataset.key === key) return;
   place.dataset.key = key;
   if (rows.length === 0) return place.replaceChildren(make("p", { class: "quiet" }, "None yet"));
-  const head = ["Role", "Name", "Host", "State", "Rows to"].map((name) => make("th", { scope: "col" }, name));
+  const head = ["Role", "Name", "Host", "State", "Rows to"].map((name) =>
+    make("th", name === "Rows to" ? { scope: "col", title: "The recorder has written all rows up to this step" } : { scope: "col" }, name));
   const body = rows.map((cells) =>
     make("tr", {}, ...cells.map((cell, column) => {
       const kind = column !== 3 ? (column === 1 ? "name" : "") : cell === "not ready" ? "warn" : "good";

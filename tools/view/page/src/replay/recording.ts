@@ -24,7 +24,7 @@ export interface RecordedStage {
   name: string;
 }
 
-interface Head {
+export interface Head {
   run: Run;
   name: string;
   complete: boolean;

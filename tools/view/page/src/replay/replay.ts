@@ -38,7 +38,7 @@ export async function startReplay(mode: PageMode): Promise<void> {
   }
 }
 
-class Replay {
+export class Replay {
   private readonly player: Player;
   private readonly timeline: Timeline;
   private readonly main: Recording;

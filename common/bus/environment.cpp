@@ -1,0 +1,282 @@
+#include "common/bus/environment.hpp"
+
+#include <arpa/inet.h>
+#include <fcntl.h>
+#include <ifaddrs.h>
+#include <net/if.h>
+#include <pwd.h>
+#include <spdlog/fmt/fmt.h>
+#include <sys/resource.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <iterator>
+#include <optional>
+#include <sstream>
+
+#include "common/config/domain.hpp"
+#include "common/config/yaml_node.hpp"
+#include "fastdds_api.hpp"
+
+namespace sls::bus {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A participant takes 13 descriptors, and one or two for each other participant.
+constexpr std::size_t kDescriptorsAtStart = 16, kDescriptorsLater = 2;
+constexpr const char* kLoopback = "127.0.0.1";
+constexpr const char* kServer = "sim_server";
+constexpr const char* kRosServer = "ROS_DISCOVERY_SERVER";
+std::atomic<bool> is_ros_server_dropped{false};
+
+std::string name_user(uid_t user) {
+  const passwd* entry = ::getpwuid(user);
+  return entry ? entry->pw_name : std::to_string(user);
+}
+
+std::string join(const std::set<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text.empty() ? "none" : text;
+}
+
+std::string read(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// The value of `--name VALUE` or `--name=VALUE` among words that a zero ends each.
+std::optional<std::string> find_option(const std::string& words, const std::string& name) {
+  std::istringstream stream(words);
+  for (std::string word; std::getline(stream, word, '\0');) {
+    if (word == name && std::getline(stream, word, '\0')) return word;
+    if (word.rfind(name + "=", 0) == 0) return word.substr(name.size() + 1);
+  }
+  return std::nullopt;
+}
+
+/// IPv4 addresses of the interfaces that are up.
+std::set<std::string> find_addresses() {
+  std::set<std::string> found;
+  ifaddrs* first = nullptr;
+  if (::getifaddrs(&first) != 0) return found;
+  for (const ifaddrs* item = first; item; item = item->ifa_next) {
+    if (!item->ifa_addr || item->ifa_addr->sa_family != AF_INET || !(item->ifa_flags & IFF_UP))
+      continue;
+    std::array<char, INET_ADDRSTRLEN> text{};
+    const auto* address = reinterpret_cast<const sockaddr_in*>(item->ifa_addr);
+    found.insert(::inet_ntop(AF_INET, &address->sin_addr, text.data(), text.size()));
+  }
+  ::freeifaddrs(first);
+  return found;
+}
+
+/// Counts without a descriptor of its own. Of a high limit only the first part.
+void count_descriptors(Environment& seen) {
+  constexpr std::size_t kMost = 1024;
+  rlimit limit{};
+  ::getrlimit(RLIMIT_NOFILE, &limit);
+  seen.most_descriptors = limit.rlim_cur;
+  seen.free_descriptors = limit.rlim_cur > kMost ? limit.rlim_cur - kMost : 0;
+  for (int i = 0; i < static_cast<int>(std::min<std::size_t>(limit.rlim_cur, kMost)); ++i)
+    if (::fcntl(i, F_GETFD) < 0) ++seen.free_descriptors;
+}
+
+/// True if `user` has shared memory on the domain.
+bool has_shared_memory(const Environment& seen, uid_t user) {
+  const int first = seen.port_base + seen.domain * seen.domain_gain;
+  for (int port = first; port < first + seen.domain_gain; ++port) {
+    struct stat status {};
+    const std::string file = "/dev/shm/" + (kSharedMemoryPrefix + ("port" + std::to_string(port)));
+    if (::stat(file.c_str(), &status) == 0 && status.st_uid == user) return true;
+  }
+  return false;
+}
+
+std::string describe_descriptors(const Environment& seen) {
+  return fmt::format("{} of {} file descriptors are free (EMFILE): ulimit -n 1024",
+                     seen.free_descriptors, seen.most_descriptors);
+}
+
+std::string describe_shared_memory(const Environment& seen) {
+  return seen.uses_shared_memory && !seen.shared_memory_defect.empty()
+             ? "/dev/shm: expected a folder that this user can write to, got '" +
+                   seen.shared_memory_defect +
+                   "': mount -t tmpfs tmpfs /dev/shm, or --qos config/qos/udp.xml"
+             : "";
+}
+
+/// The first of `programs` that `is_meant` accepts, in words; empty if it accepts none.
+template <class IsMeant>
+std::string describe_first(const Environment& seen, const IsMeant& is_meant) {
+  const auto found = std::find_if(seen.programs.begin(), seen.programs.end(), is_meant);
+  if (found == seen.programs.end()) return "";
+  const std::string name =
+      found->scenario.empty() ? "" : " of '" + config::to_printable(found->scenario) + "'";
+  return fmt::format("a flight{} ({}, {}, process {}) is on domain {}", name, found->user,
+                     found->program, found->process, found->domain);
+}
+
+std::string advise(const Environment& seen) {
+  return seen.free_domain < 0 ? "" : "; use --domain " + std::to_string(seen.free_domain);
+}
+
+/// A program of another user on this domain: its shared memory is closed to this one.
+std::string describe_other_users(const Environment& seen, bool is_sure) {
+  if (!seen.uses_shared_memory || seen.other_users.empty()) return "";
+  std::string text = describe_first(seen, [&](const FlightProgram& program) {
+    return program.domain == seen.domain && seen.other_users.count(program.user) > 0;
+  });
+  if (text.empty() && is_sure) return "";
+  if (text.empty())
+    text = fmt::format("programs of user {} are on domain {}", join(seen.other_users), seen.domain);
+  return text + advise(seen) +
+         " (users share no memory: to join it, --qos config/qos/udp.xml for all)";
+}
+
+std::string describe_addresses(const Environment& seen) {
+  if (seen.addresses.count(kLoopback) == 0)
+    return fmt::format("no interface that is up has {}: ip link set lo up", kLoopback);
+  if (seen.is_alone && !seen.is_local && seen.addresses.size() == 1)
+    return fmt::format(
+        "no interface that is up has an IPv4 address besides {}: other machines are "
+        "out of reach (ip address)",
+        kLoopback);
+  const bool is_changed = seen.is_local ? seen.addresses_at_start.count(kLoopback) == 0
+                                        : seen.addresses != seen.addresses_at_start;
+  return is_changed ? fmt::format(
+                          "the addresses of this machine were {} when this program started "
+                          "and are {} now: start it again",
+                          join(seen.addresses_at_start), join(seen.addresses))
+                    : "";
+}
+
+}  // namespace
+
+void drop_foreign_variables() {
+  if (is_ros_server_ignored()) is_ros_server_dropped = true;
+  for (const char* name :
+       {kProfilesVariable, kRosServer, "ROS_SUPER_CLIENT", "ROS2_EASY_MODE", "FASTDDS_STATISTICS",
+        "FASTDDS_BUILTIN_TRANSPORTS", "FASTDDS_ENVIRONMENT_FILE"})
+    ::unsetenv(name);
+}
+
+bool is_ros_server_ignored() {
+  const char* value = std::getenv(kRosServer);
+  return is_ros_server_dropped || (value && *value);
+}
+
+std::string find_shared_memory_defect(const fs::path& folder) {
+  std::error_code error;
+  if (!fs::is_directory(folder, error))
+    return std::strerror(error.value() != 0 ? error.value() : ENOTDIR);
+  return ::access(folder.c_str(), W_OK | X_OK) == 0 ? "" : std::strerror(errno);
+}
+
+DomainUsers find_domain_users(const Environment& given, const fs::path& table) {
+  DomainUsers users;
+  std::ifstream lines(table);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream stream(line);  // "42: 0100007F:1CF2 …", the user is the eighth word
+    const std::vector<std::string> words(std::istream_iterator<std::string>(stream), {});
+    const auto colon = words.size() < 8 ? std::string::npos : words[1].find(':');
+    if (colon == std::string::npos) continue;
+    const int offset =
+        static_cast<int>(std::strtol(words[1].c_str() + colon + 1, nullptr, 16)) - given.port_base;
+    if (offset < 0 || offset / given.domain_gain > config::kMaxDomain) continue;
+    users[offset / given.domain_gain].insert(
+        static_cast<uid_t>(std::strtoul(words[7].c_str(), nullptr, 10)));
+  }
+  return users;
+}
+
+std::vector<FlightProgram> find_programs(const DomainUsers& users, const fs::path& processes) {
+  std::vector<FlightProgram> programs;
+  std::error_code error;
+  for (const auto& entry : fs::directory_iterator(processes, error)) {
+    FlightProgram found;
+    found.process = std::atoi(entry.path().filename().c_str());
+    if (found.process <= 0 || found.process == ::getpid()) continue;
+    found.program = read(entry.path() / "comm");
+    found.program.erase(std::min(found.program.find('\n'), found.program.size()));
+    struct stat status {};
+    if (found.program != kServer && found.program != "control_client" &&
+        found.program != "recorder")
+      continue;
+    if (::stat(entry.path().c_str(), &status) != 0) continue;
+    found.user = name_user(status.st_uid);
+    const std::string words = read(entry.path() / "cmdline");
+    found.scenario = fs::path(find_option(words, "--scenario").value_or("")).stem();
+    auto domain = find_option(words, "--domain");
+    if (!domain) domain = find_option(read(entry.path() / "environ"), "SLS_DOMAIN");
+    found.domain = std::atoi(domain.value_or("0").c_str());
+    const auto is_there = [&](const auto& item) { return item.second.count(status.st_uid) > 0; };
+    // The variables of another user are not readable: of his domains the first.
+    auto place = users.find(found.domain);
+    if (!domain && (place == users.end() || !is_there(*place)))
+      place = std::find_if(users.begin(), users.end(), is_there);
+    if (place == users.end() || !is_there(*place)) continue;
+    found.domain = place->first;
+    programs.insert(found.program == kServer ? programs.begin() : programs.end(), found);
+  }
+  return programs;
+}
+
+Environment look_around(Environment seen) {
+  seen.user = name_user(::geteuid());
+  seen.is_ros_server_ignored = is_ros_server_ignored();
+  seen.shared_memory_defect = find_shared_memory_defect();
+  count_descriptors(seen);
+  seen.addresses = find_addresses();
+  const DomainUsers users = find_domain_users(seen, "/proc/net/udp");
+  if (const auto here = users.find(seen.domain); here != users.end())
+    for (const uid_t user : here->second)
+      if (user != ::geteuid() && has_shared_memory(seen, user))
+        seen.other_users.insert(name_user(user));
+  if (!users.empty()) seen.programs = find_programs(users, "/proc");
+  for (int i = 1; i <= config::kMaxDomain && seen.free_domain < 0; ++i)
+    if (const int domain = (seen.domain + i) % (config::kMaxDomain + 1); users.count(domain) == 0)
+      seen.free_domain = domain;
+  return seen;
+}
+
+std::string find_start_error(const Environment& seen) {
+  if (const std::string text = describe_shared_memory(seen); !text.empty()) return text;
+  if (seen.free_descriptors < kDescriptorsAtStart)
+    return fmt::format("expected {} free file descriptors at least, got: ", kDescriptorsAtStart) +
+           describe_descriptors(seen);
+  return describe_other_users(seen, true);
+}
+
+std::string find_cause(const Environment& seen) {
+  if (seen.is_alone && !seen.is_local && seen.is_ros_server_ignored)
+    return "ROS_DISCOVERY_SERVER is ignored: --qos config/qos/discovery_server.xml with "
+           "SLS_DISCOVERY_SERVER uses a discovery server";
+  if (const std::string text = describe_shared_memory(seen); !text.empty()) return text;
+  if (seen.free_descriptors < kDescriptorsLater) return describe_descriptors(seen);
+  if (const std::string text = describe_addresses(seen); !text.empty()) return text;
+  if (seen.participants >= seen.most_participants)
+    return fmt::format(
+        "domain {} has {} participants, the most that are heard (programs of ROS 2 "
+        "count): use another --domain",
+        seen.domain, seen.participants);
+  return describe_other_users(seen, false);
+}
+
+std::string describe_other_flight(const Environment& seen, bool is_elsewhere) {
+  const std::string text = describe_first(seen, [&](const FlightProgram& program) {
+    return is_elsewhere ? program.domain != seen.domain && program.user == seen.user
+                        : program.domain == seen.domain && program.program == kServer;
+  });
+  return text.empty() || is_elsewhere ? text : text + advise(seen);
+}
+
+}  // namespace sls::bus

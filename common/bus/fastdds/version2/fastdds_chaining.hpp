@@ -1,0 +1,30 @@
+/// A transport on top of another one that sends through that one unchanged. Fast DDS 2.
+#pragma once
+
+#include <fastdds/rtps/network/SenderResource.h>
+#include <fastdds/rtps/transport/ChainingTransport.h>
+
+#include <chrono>
+#include <cstdint>
+
+#include "fastdds_api.hpp"
+
+namespace sls::bus {
+
+class ChainedTransport : public rtps::ChainingTransport {
+ public:
+  using ChainingTransport::ChainingTransport;
+
+  rtps::TransportDescriptorInterface* get_configuration() override {
+    return low_level_transport_->get_configuration();
+  }
+
+  bool send(rtps::SenderResource* below, const rtps::octet* buffer, std::uint32_t bytes,
+            eprosima::fastdds::rtps::LocatorsIterator* first,
+            eprosima::fastdds::rtps::LocatorsIterator* last,
+            const std::chrono::steady_clock::time_point& deadline) override {
+    return below->send(buffer, bytes, first, last, deadline);
+  }
+};
+
+}  // namespace sls::bus

@@ -1,0 +1,32 @@
+/// A transport on top of another one that sends through that one unchanged. Fast DDS 3.
+#pragma once
+
+#include <fastdds/rtps/transport/ChainingTransport.hpp>
+#include <fastdds/rtps/transport/NetworkBuffer.hpp>
+#include <fastdds/rtps/transport/SenderResource.hpp>
+
+#include <chrono>
+#include <cstdint>
+#include <vector>
+
+#include "fastdds_api.hpp"
+
+namespace sls::bus {
+
+class ChainedTransport : public rtps::ChainingTransport {
+ public:
+  using ChainingTransport::ChainingTransport;
+
+  rtps::TransportDescriptorInterface* get_configuration() override {
+    return low_level_transport_->get_configuration();
+  }
+
+  bool send(rtps::SenderResource* below, const std::vector<rtps::NetworkBuffer>& buffers,
+            std::uint32_t bytes, eprosima::fastdds::rtps::LocatorsIterator* first,
+            eprosima::fastdds::rtps::LocatorsIterator* last,
+            const std::chrono::steady_clock::time_point& deadline) override {
+    return below->send(buffers, bytes, first, last, deadline);
+  }
+};
+
+}  // namespace sls::bus

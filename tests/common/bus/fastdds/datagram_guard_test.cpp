@@ -1,0 +1,139 @@
+#include "common/bus/fastdds/datagram_guard.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "common/bus/fastdds/host_id.hpp"
+
+namespace sls::bus {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+/// The header of a message and, after it, submessages in hexadecimal.
+Bytes make_message(const std::string& submessages) {
+  const std::string text = "525450530203010f0102030405060708090a0b0c" + submessages;
+  Bytes bytes;
+  for (std::size_t i = 0; i + 1 < text.size(); i += 2)
+    bytes.push_back(static_cast<std::uint8_t>(std::stoi(text.substr(i, 2), nullptr, 16)));
+  return bytes;
+}
+
+std::string judge(const Bytes& bytes) {
+  const char* defect = judge_datagram(bytes.data(), bytes.size()).defect;
+  return defect ? defect : "";
+}
+
+std::string zeros(std::size_t bytes) { return std::string(2 * bytes, '0'); }
+
+std::string replace(std::string text, const std::string& old, const std::string& by) {
+  return text.replace(text.find(old), old.size(), by);
+}
+
+// Reader and writer; numbers of samples, 4 bytes above and 4 below, little-endian; submessages.
+const std::string kEntities = "000001c7000001c2", kAnnouncer = "00000000000100c2",
+                  kHandshaker = "00000000000201c3";
+const std::string kOne = "0000000001000000", kFive = "0000000005000000", kSix = "0000000006000000",
+                  kDistant = "0100000001000000", kEndless = "ffffff7fffffffff";
+const std::string kHeartbeat = "07011c00" + kEntities, kGap = "08011c00" + kEntities,
+                  kFragment = "1601240000001c00" + kEntities + kOne, kCount = "01000000",
+                  kStatistics = "80013800" + zeros(56);
+// The token "abc" with one property "x": "y" and no bytes, and messages that end with it.
+const std::string kToken = "040000006162630001000000020000007800000002000000790000" + zeros(5),
+                  kIdentity = "1505000000001000" + kAnnouncer + kOne + "0003000001102000" + kToken,
+                  kHandshake = "1505000000001000" + kHandshaker + kOne + "00010000" + zeros(96) +
+                               "020000006100000001000000" + kToken;
+
+TEST(DatagramGuardTest, HarmfulMessagesAreRefused) {
+  const std::string too_long = "an identity that is longer than its message";
+  struct Case {
+    const char* name;
+    std::string submessages, defect;
+  };
+  const Case cases[] = {
+      {"heartbeat", kHeartbeat + kOne + kFive + kCount, ""},
+      {"of an empty history", kHeartbeat + kSix + kFive + kCount, ""},
+      {"of a distant sample", kHeartbeat + kDistant + kDistant + kCount, "a HEARTBEAT without end"},
+      {"of a distant end", kHeartbeat + kOne + kEndless + kCount, "a HEARTBEAT without end"},
+      {"big-endian", "0700001c" + kEntities + "0000000100000001000000010000000500000001",
+       "a HEARTBEAT without end"},
+      {"short", "07011800" + kEntities + kOne + kFive, "a HEARTBEAT that is cut off"},
+      {"gap", kGap + kOne + kSix + zeros(4), ""},
+      {"endless", kGap + kOne + kEndless + zeros(4), "a GAP without end"},
+      {"of 131,071 samples", kGap + kOne + "0000000000000200" + zeros(4), "a GAP without end"},
+      {"of too many bits", kGap + kOne + kSix + "01010000", "a GAP that is cut off"},
+      {"fragment", kFragment + "010000000100000400080000" + zeros(4), ""},
+      {"of 4 GB", kFragment + "0100000001000004ffffffff" + zeros(4),
+       "a fragment of a sample of impossible size"},
+      {"beyond its sample", kFragment + "040000000100000400080000" + zeros(4),
+       "a fragment beyond its sample"},
+      {"of nothing", kFragment + "010000000100000000080000" + zeros(4),
+       "a fragment beyond its sample"},
+      {"of an announcement", replace(kFragment, kEntities, kAnnouncer) + zeros(16),
+       "a fragment of an announcement"},
+      {"identity", kIdentity, ""},
+      {"of 4 GB", replace(kIdentity, kToken.substr(0, 8), "ffffffff"), too_long},
+      {"of 2^31 properties", replace(kIdentity, "61626300010000", "616263000000f0"), too_long},
+      {"longer than its announcement", replace(kIdentity, "01102000", "01102400"), too_long},
+      {"handshake", kHandshake, ""},
+      {"of 2^31 tokens", replace(kHandshake, "6100000001000000", "61000000000000f0"), too_long},
+      {"statistics in the middle", kStatistics + "01010000",
+       "statistics in the middle of a message"},
+      {"longer than the message", "15010001" + zeros(8), "a submessage that is cut off"},
+      {"half a header", "1501", "a submessage that is cut off"},
+      {"padding and time", "010100000901080000000000000000000e010c00" + zeros(12), ""},
+      {"unknown kind", "7f01040000000000", ""},
+  };
+  for (const Case& one : cases)
+    EXPECT_EQ(judge(make_message(one.submessages)), one.defect) << one.name;
+  EXPECT_EQ(judge(Bytes(5, 'R')), "no RTPS message");
+  EXPECT_EQ(judge(Bytes(100, 'x')), "no RTPS message");
+}
+
+TEST(DatagramGuardTest, StatisticsAtTheEndAreCutOff) {
+  const Bytes message = make_message("06011800" + kEntities + kOne + zeros(8) + kStatistics);
+  const DatagramVerdict verdict = judge_datagram(message.data(), message.size());
+  EXPECT_EQ(verdict.defect, nullptr);
+  EXPECT_EQ(verdict.bytes, message.size() - kStatistics.size() / 2);
+}
+
+/// The sanitizer judges.
+TEST(DatagramGuardTest, NothingBeyondADatagramIsRead) {
+  std::mt19937_64 random(1);
+  std::vector<Bytes> known;
+  for (const std::string& one : {kHeartbeat + kOne + kFive + kCount, kGap + kOne + kSix + zeros(4),
+                                 kFragment + zeros(16), kIdentity, kHandshake, kStatistics})
+    known.push_back(make_message(one));
+  for (int i = 0; i < 20'000; ++i) {
+    Bytes message = known[random() % known.size()];
+    for (std::size_t left = random() % 4; left > 0; --left)
+      message[random() % message.size()] =
+          static_cast<std::uint8_t>(random() % 2 ? random() : random() % 8);
+    message[0] = 'R';
+    message.resize(message.size() - random() % 2 * (random() % message.size()));
+    message.shrink_to_fit();
+    EXPECT_LE(judge_datagram(message.data(), message.size()).bytes, message.size());
+  }
+}
+
+TEST(DatagramGuardTest, EachSenderIsNamedOnce) {
+  RefusedDatagrams refused;
+  EXPECT_TRUE(refused.note("10.0.0.1"));
+  EXPECT_FALSE(refused.note("10.0.0.1"));
+  EXPECT_TRUE(refused.note("10.0.0.2"));
+  for (int i = 0; i < 200; ++i) refused.note("10.0.1." + std::to_string(i));
+  EXPECT_FALSE(refused.note("10.0.2.1")) << "there are too many";
+  EXPECT_EQ(refused.count(), 204u);
+}
+
+TEST(HostIdTest, TheBuildOfTheMiddlewareIsAPositiveNumberOf15Bits) {
+  EXPECT_GE(middleware_build(), 1);
+  EXPECT_LT(middleware_build(), 1 << 15);
+}
+
+}  // namespace
+}  // namespace sls::bus
