@@ -15,7 +15,7 @@ from sls.campaign.engines import ENGINES, EngineError, EngineOptions, load_engin
 from sls.campaign.folder import CampaignFolder, opened
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
-from sls.launcher.place import say, show
+from sls.launcher.place import printing, say, show
 from sls.scenario import ROOT
 
 MOST_CHUNKS = 10_000  # files in a folder
@@ -209,8 +209,9 @@ def parse_folders(command: str, arguments: Sequence[str], *names: str) -> list[P
 
 def show_status(arguments: Sequence[str]) -> None:
     folder = CampaignFolder(*parse_folders("status", arguments, "DIR"))
-    for line in describe_status(folder):
-        show(line)
+    with printing():
+        for line in describe_status(folder):
+            show(line)
 
 
 def describe_status(folder: CampaignFolder) -> list[str]:
@@ -264,7 +265,8 @@ def make_report(arguments: Sequence[str]) -> None:
 
 def show_comparison(arguments: Sequence[str]) -> None:
     from sls.campaign.compare import compare
-    show(compare(*parse_folders("compare", arguments, "A", "B")).rstrip("\n"))
+    with printing():
+        show(compare(*parse_folders("compare", arguments, "A", "B")).rstrip("\n"))
 
 
 COMMANDS = {"status": show_status, "report": make_report, "compare": show_comparison}

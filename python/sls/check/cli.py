@@ -20,7 +20,7 @@ from sls.check.judge import judge, open_recording
 from sls.check.results import HELD, Result, count_verdicts, describe, find_code, make_rows, write_files
 from sls.errors import ConfigError, RunError
 from sls.input_error import InputError
-from sls.launcher.place import find_width, printing, say, show
+from sls.launcher.place import printing, say, show
 
 MOST_LOG_LINES = 30
 MEANING = "Flies the scenario of each check file and judges its recording."
@@ -237,7 +237,7 @@ def print_results(results: Sequence[Result]) -> None:
         return
     shown = {(one.check, one.placement, *one.list_problems()): one for one in reversed(results) if one.placement}
     shown = list(reversed(shown.values()))
-    for line in make_rows(shown, find_width()):
+    for line in make_rows(shown, shutil.get_terminal_size((10**6, 0)).columns):
         show(line)
     for one in shown:
         for problem in one.list_problems():

@@ -1,10 +1,11 @@
 """`./sls list`: scenarios, campaigns, laws and plants, one line each."""
 
 import re
+import shutil
 import textwrap
 
 from sls.launcher.arguments import Parser
-from sls.launcher.place import ROOT, find_width, list_names
+from sls.launcher.place import ROOT, list_names
 
 # As control_client/laws/laws.def and sim_server/plants/plants.def name them.
 LAWS = {
@@ -35,7 +36,7 @@ def print_list(words: list[str]) -> int:
     parts = {f"{kind.capitalize()}: {use}": {name: describe(kind, name) for name in list_names(kind)}
              for kind, use in (("scenarios", "./sls run NAME"), ("campaigns", "./sls campaign NAME"))}
     parts |= {"Laws: controller.law in a scenario": LAWS, "Plants: plant.model in a scenario": PLANTS}
-    width = find_width()
+    width = shutil.get_terminal_size((10**6, 0)).columns  # a pipe takes lines of any length
     for title, entries in parts.items():
         print(title)
         longest = max(map(len, entries))

@@ -56,12 +56,6 @@ def drop(descriptor: int) -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
 
 
-def find_width() -> int:
-    """Columns of the terminal on standard output. A pipe and a file take lines of any length."""
-    import shutil  # takes longer to load than this module
-    return shutil.get_terminal_size().columns if sys.stdout and sys.stdout.isatty() else 10**6
-
-
 SIGNS = {"≤": "<=", "≥": ">=", "…": "...", "×": "x", "–": "-"}
 
 
