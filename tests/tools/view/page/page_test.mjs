@@ -221,8 +221,13 @@ test("a phone shows everything without scrolling sideways, and every control has
 
 test("after the end of a flight the page replays it, also without sls_view", async () => {
   const ended = await startFlight();
-  await withPage([], {}, async (page, { viewer }) => {
+  await withPage([], { scheme: "light" }, async (page, { viewer }) => {
     await untilFlies(page, 500);
+    await page.click("#table-toggle");
+    assert.notEqual(...(await page.$eval("#table-toggle", (button) => ["color", "backgroundColor"].map((name) => getComputedStyle(button)[name]))));
+    assert.doesNotMatch(await page.$eval("#events", ({ textContent }) => textContent), /not ready/);
+    for (const name of ["Rows to", "Published → drawn"])
+      assert.ok(await page.$$eval("th, dt", (all, wanted) => all.find(({ textContent }) => textContent === wanted)?.title, name), name);
     await page.click("[data-action=stop]");
     await page.click("#confirm-yes");
     await waitFor("replay", () => page.$("#time"));
