@@ -42,9 +42,7 @@ class CallGuard {
   sigjmp_buf& place();
   [[noreturn]] void after_crash();
 
-  /// Restores floating-point mode, locale, working folder and umask; returns what was changed, or
-  /// "". In flight it looks at folder and umask (20 µs) only in the calls that README.md
-  /// lists.
+  /// Restores what the call changed outside the library (README.md, "Rules"); returns it, or "".
   std::string put_back();
 
  private:
