@@ -12,6 +12,7 @@
 #include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <locale>
 #include <mutex>
 #include <optional>
 #include <string_view>
@@ -32,15 +33,17 @@ std::atomic<double> patience_s{60.0};
 
 const locale_t kCLocale = ::newlocale(LC_ALL_MASK, "C", nullptr);
 
-/// Where the process makes files, and with which rights.
-struct FileState {
+/// What it takes 20 µs to look at: where the process makes files, with which rights, and the
+/// locale of new C++ streams. A locale with a name is that of the C library, too.
+struct SlowState {
+  std::locale streams;
   struct stat folder {};
   std::string path;  // of the folder; another process may rename it
   mode_t mask = 0;
 };
 
-FileState look_at_files() {
-  FileState state;
+SlowState look() {
+  SlowState state;
   ::stat(".", &state.folder);
   std::error_code ignored;
   state.path = std::filesystem::current_path(ignored).string();
@@ -51,8 +54,12 @@ FileState look_at_files() {
 }
 
 /// Puts `before` back and returns what was changed, or "".
-std::string put_back_files(const FileState& before) {
-  const FileState now = look_at_files();
+std::string put_back_slow(const SlowState& before) {
+  const SlowState now = look();
+  if (now.streams != before.streams) {
+    std::locale::global(before.streams);
+    return "changed the locale of the process";
+  }
   if (now.mask != before.mask) ::umask(before.mask);
   if (now.folder.st_dev == before.folder.st_dev && now.folder.st_ino == before.folder.st_ino)
     return now.mask == before.mask ? "" : "changed the umask of the process";
@@ -68,10 +75,15 @@ struct ThreadRecord {
   sigjmp_buf place;
   bool has_place = false;
   std::uint64_t calls_in_flight = 0;
-  std::optional<FileState> files;                    // before the calls since the last look
+  std::string locale;                                // of the C library, before the call
+  std::optional<SlowState> slow;                     // before the calls since the last look
   int crash = 0;                                     // the signal
   alignas(16) std::array<char, 16384> signal_stack;  // a stack overflow leaves no room on its own
 };
+
+bool is_locale_changed(const ThreadRecord& record) {
+  return std::strcmp(::setlocale(LC_ALL, nullptr), record.locale.c_str()) != 0;
+}
 
 /// A line of text, built without allocation because signal handlers use it.
 class Line {
@@ -262,14 +274,13 @@ void warn(const char* message) { Line().begin("warning").add(message).add("\n").
 CallGuard::CallGuard(const Call& call, bool is_in_flight)
     : is_in_flight_(is_in_flight),
       floating_point_mode_(floating_point_mode()),
-      process_locale_(::setlocale(LC_ALL, nullptr)),
       thread_locale_(::uselocale(kCLocale)) {
   thread_local Registration registration;
   ThreadRecord& record = registration.record;
   const std::uint64_t number = is_in_flight ? ++record.calls_in_flight : 0;
-  looks_at_files_ = number % 4096 == 0 || (number < 4096 && (number & (number - 1)) == 0);
-  if (!record.files || (looks_at_files_ && expects_changes_between_calls))
-    record.files = look_at_files();
+  looks_ = number % 4096 == 0 || (number < 4096 && (number & (number - 1)) == 0);
+  if (!record.slow || (looks_ && expects_changes_between_calls)) record.slow = look();
+  if (is_locale_changed(record)) record.locale = ::setlocale(LC_ALL, nullptr);
   record.call = call;
   record.calls.fetch_add(1, std::memory_order_release);
 }
@@ -281,14 +292,14 @@ std::string CallGuard::put_back() {
     change = "changed the floating-point mode of the thread (rounding, flush to zero or traps)";
   }
   if (::uselocale(thread_locale_) != kCLocale) change = "changed the locale of the thread";
-  if (process_locale_ != ::setlocale(LC_ALL, nullptr) || streams_locale_ != std::locale()) {
-    std::locale::global(streams_locale_);
-    ::setlocale(LC_ALL, process_locale_.c_str());
+  if (is_locale_changed(*current)) {
+    std::locale::global(current->slow->streams);
+    ::setlocale(LC_ALL, current->locale.c_str());
     change = "changed the locale of the process";
   }
-  const std::string files = looks_at_files_ ? put_back_files(*current->files) : "";
-  if (files.empty()) return change;
-  return files + (is_in_flight_ ? " in this or an earlier call" : "");
+  if (!looks_) return change;
+  const std::string slow = put_back_slow(*current->slow);
+  return slow.empty() ? change : slow + (is_in_flight_ ? " in this or an earlier call" : "");
 }
 
 CallGuard::~CallGuard() {

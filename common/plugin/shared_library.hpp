@@ -10,7 +10,6 @@
 #include <exception>
 #include <filesystem>
 #include <functional>
-#include <locale>
 #include <stdexcept>
 #include <string>
 
@@ -43,17 +42,13 @@ class CallGuard {
   sigjmp_buf& place();
   [[noreturn]] void after_crash();
 
-  /// Restores floating-point mode, locale, working folder and umask; returns what was changed, or
-  /// "". In flight it looks at folder and umask (20 µs) in the calls of a thread that README.md
-  /// lists.
+  /// Restores what the call changed outside the library (README.md, "Rules"); returns it, or "".
   std::string put_back();
 
  private:
   const bool is_in_flight_;
-  bool looks_at_files_ = false;
+  bool looks_ = false;
   const std::uint64_t floating_point_mode_;
-  const std::string process_locale_;
-  const std::locale streams_locale_;
   const locale_t thread_locale_;
 };
 

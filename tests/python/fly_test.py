@@ -214,11 +214,11 @@ def test_a_decimal_comma_changes_no_flight(tmp_path, monkeypatch, flag):
     (tmp_path / "comma").write_text('LC_NUMERIC\ndecimal_point ","\nthousands_sep ""\ngrouping -1\nEND LC_NUMERIC\n')
     subprocess.run(["localedef", "-c", "--no-archive", "-i", "comma", "./xx_XX"], cwd=tmp_path, capture_output=True)
     (tmp_path / "sls").symlink_to(ROOT / "sim_server/plants/shared_library")
-    subprocess.run(["cc", "-shared", "-fPIC", flag, f"-I{tmp_path}", ROOT / "examples/my_plant/my_plant.c", "-o",
-                    tmp_path / "my_plant.so"], check=True)
+    plant = tmp_path / "my_plant.so"
+    source = ROOT / "examples/my_plant/my_plant.c"
+    subprocess.run(["cc", "-shared", "-fPIC", flag, f"-I{tmp_path}", source, "-o", plant], check=True)
     scenario = sls.load_scenario("short", plant={
-        "model": str(tmp_path / "my_plant.so"), "parameters": {"stiffness_n_m": 2000.5},
-        "initial": {"load_position_m": [0, 0, -0.5]}})
+        "model": str(plant), "parameters": {"stiffness_n_m": 2000.5}, "initial": {"load_position_m": [0, 0, -0.5]}})
 
     def fly(name):
         sls.fly("aggressive_slack").save(tmp_path / name)
@@ -226,12 +226,12 @@ def test_a_decimal_comma_changes_no_flight(tmp_path, monkeypatch, flag):
         return sls.fly(scenario).certificate, [line for line in lines if "taut" in line]
 
     before = fly("before")
-    monkeypatch.setenv("LOCPATH", str(tmp_path))
-    locale.setlocale(locale.LC_NUMERIC, "xx_XX")
-    try:
-        assert fly("after") == before and locale.str(0.5) == "0,5"
-    finally:
+    with monkeypatch.context() as patch:
+        patch.setenv("LOCPATH", str(tmp_path))
+        locale.setlocale(locale.LC_NUMERIC, "xx_XX")
+        after, half = fly("after"), locale.str(0.5)
         locale.setlocale(locale.LC_NUMERIC, "C")
+    assert after == before and half == "0,5"
 
 
 def test_a_disk_that_refuses_is_an_os_error(tmp_path):

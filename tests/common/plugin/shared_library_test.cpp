@@ -172,14 +172,13 @@ std::string describe_state() {
 TEST(CallTest, AChangeOutsideTheLibraryIsNamedAndPutBack) {
   const std::string mode = "floating-point mode of the thread (rounding, flush to zero or traps)",
                     files = " of the process in this or an earlier call", before = describe_state();
-  const std::map<std::string, std::string> changes = {
-      {"round up", mode},
-      {"flush to zero", mode},
-      {"set locale", "locale of the process"},
-      {"set locale of streams", "locale of the process"},
-      {"use locale", "locale of the thread"},
-      {"change folder", "working folder" + files},
-      {"change mask", "umask" + files}};
+  const std::map<std::string, std::string> changes = {{"round up", mode},
+                                                      {"flush to zero", mode},
+                                                      {"set locale", "locale of the process"},
+                                                      {"set locale of streams", "locale" + files},
+                                                      {"use locale", "locale of the thread"},
+                                                      {"change folder", "working folder" + files},
+                                                      {"change mask", "umask" + files}};
   for (const auto& [how, what] : changes) {
     std::string error = "no error";
     std::thread thread([&, how = how] {  // a new one: not every call looks at folder and umask
