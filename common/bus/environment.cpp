@@ -42,12 +42,6 @@ std::string name_user(uid_t user) {
   return entry ? entry->pw_name : std::to_string(user);
 }
 
-std::string join(const std::set<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text.empty() ? "none" : text;
-}
-
 std::string read(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
@@ -79,39 +73,14 @@ std::set<std::string> find_addresses() {
   return found;
 }
 
-/// Counts without a descriptor of its own. Of a high limit only the first part.
-void count_descriptors(Environment& seen) {
-  constexpr std::size_t kMost = 1024;
+/// Free descriptors among the first 4,096, counted without another one.
+std::size_t count_free_descriptors() {
   rlimit limit{};
   ::getrlimit(RLIMIT_NOFILE, &limit);
-  seen.most_descriptors = limit.rlim_cur;
-  seen.free_descriptors = limit.rlim_cur > kMost ? limit.rlim_cur - kMost : 0;
-  for (int i = 0; i < static_cast<int>(std::min<std::size_t>(limit.rlim_cur, kMost)); ++i)
-    if (::fcntl(i, F_GETFD) < 0) ++seen.free_descriptors;
-}
-
-/// True if `user` has shared memory on the domain.
-bool has_shared_memory(const Environment& seen, uid_t user) {
-  const int first = seen.port_base + seen.domain * seen.domain_gain;
-  for (int port = first; port < first + seen.domain_gain; ++port) {
-    struct stat status {};
-    const std::string file = "/dev/shm/" + (kSharedMemoryPrefix + ("port" + std::to_string(port)));
-    if (::stat(file.c_str(), &status) == 0 && status.st_uid == user) return true;
-  }
-  return false;
-}
-
-std::string describe_descriptors(const Environment& seen) {
-  return fmt::format("{} of {} file descriptors are free (EMFILE): ulimit -n 1024",
-                     seen.free_descriptors, seen.most_descriptors);
-}
-
-std::string describe_shared_memory(const Environment& seen) {
-  return seen.uses_shared_memory && !seen.shared_memory_defect.empty()
-             ? "/dev/shm: expected a folder that this user can write to, got '" +
-                   seen.shared_memory_defect +
-                   "': mount -t tmpfs tmpfs /dev/shm, or --qos config/qos/udp.xml"
-             : "";
+  std::size_t free = 0;
+  for (int i = 0; i < static_cast<int>(std::min<rlim_t>(limit.rlim_cur, 4096)); ++i)
+    if (::fcntl(i, F_GETFD) < 0) ++free;
+  return free;
 }
 
 /// The first of `programs` that `is_meant` accepts, in words; empty if it accepts none.
@@ -129,33 +98,18 @@ std::string advise(const Environment& seen) {
   return seen.free_domain < 0 ? "" : "; use --domain " + std::to_string(seen.free_domain);
 }
 
-/// A program of another user on this domain: its shared memory is closed to this one.
-std::string describe_other_users(const Environment& seen, bool is_sure) {
-  if (!seen.uses_shared_memory || seen.other_users.empty()) return "";
-  std::string text = describe_first(seen, [&](const FlightProgram& program) {
-    return program.domain == seen.domain && seen.other_users.count(program.user) > 0;
-  });
-  if (text.empty() && is_sure) return "";
-  if (text.empty())
-    text = fmt::format("programs of user {} are on domain {}", join(seen.other_users), seen.domain);
-  return text + advise(seen) +
-         " (users share no memory: to join it, --qos config/qos/udp.xml for all)";
-}
-
 std::string describe_addresses(const Environment& seen) {
   if (seen.addresses.count(kLoopback) == 0)
-    return fmt::format("no interface that is up has {}: ip link set lo up", kLoopback);
+    return "no interface that is up has 127.0.0.1: ip link set lo up";
   if (seen.is_alone && !seen.is_local && seen.addresses.size() == 1)
-    return fmt::format(
-        "no interface that is up has an IPv4 address besides {}: other machines are "
-        "out of reach (ip address)",
-        kLoopback);
+    return "no interface that is up has an IPv4 address besides 127.0.0.1: other machines are out "
+           "of reach (ip address)";
   const bool is_changed = seen.is_local ? seen.addresses_at_start.count(kLoopback) == 0
                                         : seen.addresses != seen.addresses_at_start;
   return is_changed ? fmt::format(
-                          "the addresses of this machine were {} when this program started "
-                          "and are {} now: start it again",
-                          join(seen.addresses_at_start), join(seen.addresses))
+                          "the addresses of this machine were '{}' when this program started "
+                          "and are '{}' now: start it again",
+                          fmt::join(seen.addresses_at_start, ", "), fmt::join(seen.addresses, ", "))
                     : "";
 }
 
@@ -234,41 +188,41 @@ Environment look_around(Environment seen) {
   seen.user = name_user(::geteuid());
   seen.is_ros_server_ignored = is_ros_server_ignored();
   seen.shared_memory_defect = find_shared_memory_defect();
-  count_descriptors(seen);
+  seen.free_descriptors = count_free_descriptors();
   seen.addresses = find_addresses();
   const DomainUsers users = find_domain_users(seen, "/proc/net/udp");
-  if (const auto here = users.find(seen.domain); here != users.end())
-    for (const uid_t user : here->second)
-      if (user != ::geteuid() && has_shared_memory(seen, user))
-        seen.other_users.insert(name_user(user));
-  if (!users.empty()) seen.programs = find_programs(users, "/proc");
+  seen.programs = find_programs(users, "/proc");
   for (int i = 1; i <= config::kMaxDomain && seen.free_domain < 0; ++i)
     if (const int domain = (seen.domain + i) % (config::kMaxDomain + 1); users.count(domain) == 0)
       seen.free_domain = domain;
   return seen;
 }
 
-std::string find_start_error(const Environment& seen) {
-  if (const std::string text = describe_shared_memory(seen); !text.empty()) return text;
-  if (seen.free_descriptors < kDescriptorsAtStart)
-    return fmt::format("expected {} free file descriptors at least, got: ", kDescriptorsAtStart) +
-           describe_descriptors(seen);
-  return describe_other_users(seen, true);
-}
-
-std::string find_cause(const Environment& seen) {
-  if (seen.is_alone && !seen.is_local && seen.is_ros_server_ignored)
+std::string find_cause(const Environment& seen, bool is_start) {
+  if (!is_start && seen.is_alone && !seen.is_local && seen.is_ros_server_ignored)
     return "ROS_DISCOVERY_SERVER is ignored: --qos config/qos/discovery_server.xml with "
            "SLS_DISCOVERY_SERVER uses a discovery server";
-  if (const std::string text = describe_shared_memory(seen); !text.empty()) return text;
-  if (seen.free_descriptors < kDescriptorsLater) return describe_descriptors(seen);
-  if (const std::string text = describe_addresses(seen); !text.empty()) return text;
-  if (seen.participants >= seen.most_participants)
+  if (seen.uses_shared_memory && !seen.shared_memory_defect.empty())
+    return "/dev/shm: expected a folder that this user can write to, got '" +
+           seen.shared_memory_defect +
+           "': mount -t tmpfs tmpfs /dev/shm, or --qos config/qos/udp.xml";
+  const std::size_t needed = is_start ? kDescriptorsAtStart : kDescriptorsLater;
+  if (seen.free_descriptors < needed)
     return fmt::format(
-        "domain {} has {} participants, the most that are heard (programs of ROS 2 "
-        "count): use another --domain",
-        seen.domain, seen.participants);
-  return describe_other_users(seen, false);
+        "expected {} free file descriptors at least, got {} (EMFILE): ulimit -n 1024", needed,
+        seen.free_descriptors);
+  if (const std::string text = describe_addresses(seen); !is_start && !text.empty()) return text;
+  if (seen.participants >= seen.most_participants)
+    return fmt::format("domain {} has {} participants, the most that are heard (ROS 2 counts)",
+                       seen.domain, seen.participants) +
+           advise(seen);
+  const std::string flight = describe_first(seen, [&](const FlightProgram& program) {
+    return program.domain == seen.domain && program.user != seen.user && seen.uses_shared_memory;
+  });
+  return flight.empty()
+             ? ""
+             : flight + advise(seen) +
+                   " (users share no memory: to join it, --qos config/qos/udp.xml for all)";
 }
 
 std::string describe_other_flight(const Environment& seen, bool is_elsewhere) {

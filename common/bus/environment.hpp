@@ -1,4 +1,4 @@
-/// What a program can know about its machine when it meets no other program, and the cause in it.
+/// What this machine tells about why a program meets no other, and the first cause among it.
 #pragma once
 
 #include <sys/types.h>
@@ -12,7 +12,7 @@
 
 namespace sls::bus {
 
-/// A sim_server, control_client or recorder that runs on this machine.
+/// A sim_server, control_client or recorder on this machine.
 struct FlightProgram {
   std::string program, user;
   int process = 0;
@@ -33,35 +33,29 @@ struct Environment {
   std::size_t participants = 1, most_participants = 64;  ///< on the domain, with this one
   std::set<std::string> addresses_at_start;
 
-  std::string user;                    ///< of this process
-  bool is_ros_server_ignored = false;  ///< ROS_DISCOVERY_SERVER was set
+  std::string user;  ///< of this process
+  bool is_ros_server_ignored = false;
   std::string shared_memory_defect;
-  std::size_t free_descriptors = 1000, most_descriptors = 1024;
-  std::set<std::string> addresses;    ///< IPv4, of interfaces that are up
-  std::set<std::string> other_users;  ///< with shared memory on this domain
-  /// Other processes: servers first.
-  std::vector<FlightProgram> programs;
-  int free_domain = -1;  ///< without any participant on this machine; −1: none
+  std::size_t free_descriptors = 1024;
+  std::set<std::string> addresses;      ///< IPv4, of interfaces that are up
+  std::vector<FlightProgram> programs;  ///< of other processes; servers first
+  int free_domain = -1;                 ///< without participants on this machine; −1: none
 };
 
 Environment look_around(Environment given);
 
-/// Why a program cannot work here, in one line; empty if it can.
-std::string find_start_error(const Environment& seen);
-
-/// The first known cause, with its cure, that keeps participants from finding each other; empty if
-/// none is known.
-std::string find_cause(const Environment& seen);
+/// The first known cause, with its cure, why participants do not meet; empty if none is known. With
+/// `is_start`: why a program that starts now cannot fly.
+std::string find_cause(const Environment& seen, bool is_start = false);
 
 /// "a flight of 'hover' (root, sim_server, process 4711) is on domain 5; use --domain 6": a server
-/// on this domain, or `is_elsewhere` a program of this user on another one, without advice; empty
-/// if none.
+/// on this domain. With `is_elsewhere` a program of this user on another one, without advice.
 std::string describe_other_flight(const Environment& seen, bool is_elsewhere = false);
 
-/// Removes the variables of the environment that change what Fast DDS does. Only the file of --qos
-/// counts.
+/// Removes the variables of the environment that change what Fast DDS does: only --qos counts.
 void drop_foreign_variables();
-bool is_ros_server_ignored();  ///< ROS_DISCOVERY_SERVER was set, now or when they were dropped
+/// True if ROS_DISCOVERY_SERVER is set, or was when it was dropped.
+bool is_ros_server_ignored();
 
 /// Why a program cannot put its shared memory into `folder`; empty if it can.
 std::string find_shared_memory_defect(const std::filesystem::path& folder = "/dev/shm");

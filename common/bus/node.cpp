@@ -258,7 +258,7 @@ struct Node::Impl {
     environment.most_participants = qos.allocation().participants.maximum;
     const Environment seen = look_around(environment);
     environment.addresses_at_start = seen.addresses;
-    if (const std::string error = find_start_error(seen); !error.empty()) throw BusError(error);
+    if (const std::string error = find_cause(seen, true); !error.empty()) throw BusError(error);
   }
 
   /// Fast DDS finds no room only when it writes, and then the process dies of SIGBUS.

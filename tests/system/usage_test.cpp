@@ -83,16 +83,28 @@ TEST(UsageTest, RecorderRefusesAFolderThatIsNotEmptyAndReplacesARecordingWithFor
   EXPECT_FALSE(fs::exists(folder / "old/state.csv"));
 }
 
-TEST(UsageTest, TooLittleSharedMemoryIsNamedBeforeTheFirstSample) {
+TEST(UsageTest, WhatAMachineLacksIsNamedBeforeTheFirstSample) {
   if (geteuid() != 0) GTEST_SKIP() << "skipped: only root can mount another /dev/shm";
   const TemporaryFolder folder;
-  const Words limited = {"/usr/bin/unshare", "--mount", "sh", "-c",
-                         "mount -t tmpfs -o size=1m tmpfs /dev/shm && exec \"$0\" \"$@\""};
-  for (const Words& command : {Words{program("sim_server"), "--scenario", scenario("short")},
-                               {program("control_client"), "--scenario", scenario("short")},
-                               {program("recorder"), "--out", folder / "recording"}})
-    expect_refused(limited + command, 1,
-                   "/dev/shm: expected 10.7 MB free, got 1.0 MB: mount -o remount,size=64M");
+  for (const auto& [change, words] :
+       {std::pair("mount -t tmpfs -o size=1m tmpfs /dev/shm",
+                  "/dev/shm: expected 10.7 MB free, got 1.0 MB: mount -o remount,size=64M"),
+        std::pair("mount -t tmpfs -o ro tmpfs /dev/shm", "got 'Read-only file system': mount -t"),
+        std::pair("ulimit -n 14", "(EMFILE): ulimit -n")})
+    for (const Words& command : {Words{program("sim_server"), "--scenario", scenario("short")},
+                                 {program("control_client"), "--scenario", scenario("short")},
+                                 {program("recorder"), "--out", folder / "recording"}})
+      expect_refused(Words{"/usr/bin/unshare", "--mount", "sh", "-c",
+                           change + std::string(" && exec \"$0\" \"$@\"")} +
+                         command,
+                     1, words);
+}
+
+TEST(UsageTest, AVariableOfRosThatNamesADiscoveryServerChangesNothing) {
+  FlightOptions options;
+  for (const char* name : {"recorder", "sim_server", "control_client"})
+    options.before[name] = {"env", "ROS_DISCOVERY_SERVER=127.0.0.1:9"};
+  Flight(scenario("short"), options).expect_success();
 }
 
 TEST(UsageTest, ABusErrorIsExplainedBeforeItEndsTheProgram) {
@@ -116,6 +128,15 @@ TEST(UsageTest, ClientWithAnotherScenarioIsRefusedWithBothHashes) {
   EXPECT_EQ(client.wait(), 2);
   const std::regex both("error: .*expected the server's, SHA-256 [0-9a-f]{64}, got [0-9a-f]{64}");
   EXPECT_TRUE(std::regex_search(client.output(), both)) << client.output();
+  const std::regex flight("a flight of 'short' \\(\\w+, sim_server, process \\d+\\) is on domain " +
+                          domain.text() + "; use --domain \\d+");
+  EXPECT_TRUE(std::regex_search(client.output(), flight)) << client.output();
+  Process stranger(
+      Words{"setpriv", "--reuid", "65534", "--clear-groups"} +
+      make_command("control_client", domain.number(), {"--scenario", scenario("short")}));
+  EXPECT_NE(stranger.wait(), 0);
+  if (geteuid() == 0 && !holds(stranger.output(), "failed to execute"))
+    EXPECT_TRUE(std::regex_search(stranger.output(), flight)) << stranger.output();
   EXPECT_TRUE(server.is_running());
   server.send(SIGTERM);
   EXPECT_EQ(server.wait(), 143);

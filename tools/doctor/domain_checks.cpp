@@ -50,7 +50,14 @@ Check check_domain_number(const Observations& seen) {
   auto flying = find_flying(seen);
   const std::set<std::string> here = flying[seen.domain];
   flying.erase(seen.domain);
+  std::string elsewhere;
   for (const auto& [domain, names] : flying) {
+    // A whole flight misses nobody. It may be that of somebody else.
+    if (names.count(kServer) > 0 && names.count("control_client") > 0 &&
+        (here.empty() || here.count(kServer) > 0)) {
+      elsewhere += "; a flight is on domain " + std::to_string(domain);
+      continue;
+    }
     // A server and its programs on another domain may be a separate flight. A server on one domain
     // and only programs without a server on the other show a wrong --domain.
     const bool is_lost = here.empty() || (here.count(kServer) == 0) != (names.count(kServer) == 0);
@@ -61,12 +68,13 @@ Check check_domain_number(const Observations& seen) {
                               own + ": they never meet: start all with --domain " + other +
                               ", or all with --domain " + own);
   }
-  if (!here.empty()) return ok(kName, list_flying(here) + " on domain " + own);
+  if (!here.empty()) return ok(kName, list_flying(here) + " on domain " + own + elsewhere);
   if (!seen.peer.empty() && !seen.probes.is_there()) return skipped(kName, "no program is heard");
   if (!seen.peer.empty() && !seen.is_peer_here && !seen.probes.is_answered)
     return finding(kName, "no program of sls is at " + seen.peer + " on domain " + own +
                               ": start it, or sls_doctor --answer there to try the way to it");
-  return ok(kName, "no program of sls runs on any domain that is heard");
+  return ok(kName, elsewhere.empty() ? "no program of sls runs on any domain that is heard"
+                                     : "no program is on domain " + own + elsewhere);
 }
 
 Check check_security(const Observations& seen) {

@@ -4,6 +4,7 @@
 #include <set>
 #include <sstream>
 
+#include "common/bus/environment.hpp"
 #include "common/config/yaml_node.hpp"
 #include "tools/doctor/diagnosis_parts.hpp"
 
@@ -126,6 +127,9 @@ Check check_network(const Observations& seen) {
   if (probes.is_there() || seen.is_peer_up || is_any_heard(seen) || is_any_discovered(seen))
     return ok(kName, name_peer(seen) + " is reached" +
                          (seen.is_peer_here ? "" : " from " + probes.own_address));
+  if (seen.peer.empty())
+    return finding(kName, name_peer(seen) + " does not reach itself at " + seen.peer_address +
+                              ": the interface is down: ip link set lo up");
   return finding(
       kName, seen.peer + (probes.is_unreachable ? " is unreachable" : " does not answer at all") +
                  ": the machine is down, the address is wrong, or there is no route: ping " +
@@ -196,6 +200,10 @@ Check check_datagrams(const Observations& seen) {
 Check check_discovery(const Observations& seen) {
   constexpr const char* kName = "discovery";
   const auto& servers = seen.settings.discovery_servers;
+  if (servers.empty() && bus::is_ros_server_ignored())
+    return ok(kName,
+              "ROS_DISCOVERY_SERVER is set, and the programs ignore it: config/qos/"
+              "discovery_server.xml with SLS_DISCOVERY_SERVER uses a discovery server");
   if (servers.empty()) return skipped(kName, "this QoS file needs no discovery server");
   if (!seen.programs.empty())
     return ok(kName, "the discovery server at " + join(servers) + " answers");

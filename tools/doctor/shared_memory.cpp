@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <system_error>
 
+#include "common/bus/environment.hpp"
 #include "common/bus/fastdds/stale_segments.hpp"
 #include "fastdds_files.hpp"
 
@@ -25,7 +26,7 @@ std::string find_user_name(uid_t user) {
 SharedMemory survey_shared_memory(const std::filesystem::path& folder) {
   SharedMemory found;
   struct statvfs room {};
-  if (::statvfs(folder.c_str(), &room) != 0 || ::access(folder.c_str(), R_OK | W_OK | X_OK) != 0)
+  if (::statvfs(folder.c_str(), &room) != 0 || !bus::find_shared_memory_defect(folder).empty())
     return found;
   found.is_there = true;
   found.size = static_cast<std::uint64_t>(room.f_blocks) * room.f_frsize;

@@ -125,6 +125,25 @@ TEST(DiagnosisTest, AnotherFlightOnAnotherDomainIsNoFault) {
   }
 }
 
+TEST(DiagnosisTest, AWholeFlightElsewhereIsNoFaultWhereNoProgramIs) {
+  Observations seen = make_healthy();
+  seen.programs.clear();
+  seen.heard = {{5, seen.peer_address, {}}, {5, seen.peer_address, {}}};
+  seen.heard[0].announcement.name = "sim_server";
+  EXPECT_EQ(list_findings(seen), Names{"domain"}) << "it waits for others";
+  seen.heard[1].announcement.name = "control_client";
+  EXPECT_EQ(list_findings(seen), Names{});
+}
+
+TEST(DiagnosisTest, AMachineThatDoesNotReachItselfIsNamed) {
+  Observations seen;
+  seen.probes.is_tried = seen.probes.is_unreachable = true;
+  seen.peer_address = "127.0.0.1";
+  EXPECT_EQ(diagnose(seen)[2].text,
+            "this machine does not reach itself at 127.0.0.1: the interface "
+            "is down: ip link set lo up");
+}
+
 TEST(DiagnosisTest, AProgramThatAnswersNoHandshakeRejectsUs) {
   Observations seen = make_healthy();
   seen.settings.is_secured = seen.programs.front().is_secured = true;
