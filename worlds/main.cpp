@@ -10,6 +10,7 @@
 #include <string>
 #include <thread>
 
+#include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
 #include "worlds/scenarios.hpp"
@@ -66,13 +67,12 @@ void print_result(const worlds::SearchResult& result, double wall_s) {
   std::cout << fmt::format("worlds with a fault: {}; {} of {} faults began\n",
                            faults.empty() ? "none" : faults, result.begun_faults,
                            result.planned_faults);
-  for (const std::string& line : result.table.describe()) std::cout << line << '\n';
+  for (const std::string& line : result.table.describe()) app::print(line);
 }
 
 void print_story(const worlds::Plan& plan, const std::vector<worlds::FlownScenario>& scenarios,
                  const std::filesystem::path& folder) {
-  for (const std::string& line : worlds::tell(plan, scenarios, folder))
-    std::cout << "  " << line << '\n';
+  for (const std::string& line : worlds::tell(plan, scenarios, folder)) app::print("  " + line);
 }
 
 }  // namespace
@@ -135,10 +135,10 @@ int main(int argc, char** argv) {
     if (replayed) {
       const worlds::Plan plan = worlds::draw_plan(*replayed, scenarios, options.cases);
       if (!is_verbose) return print_story(plan, scenarios, folder.path());
-      for (const std::string& line : worlds::describe(plan)) std::cout << line << '\n';
+      for (const std::string& line : worlds::describe(plan)) app::print(line);
       for (const std::string& line :
            worlds::fly_world(plan, scenarios, folder.path() / "replay", true).trace)
-        std::cout << line << '\n';
+        app::print(line);
       return;
     }
     const auto began = std::chrono::steady_clock::now();
@@ -160,7 +160,7 @@ int main(int argc, char** argv) {
     }
     for (const auto& [seed, findings] : result.failures) {
       std::cout << fmt::format("seed {}:\n", seed);
-      for (const std::string& finding : findings) std::cout << "  " << finding << '\n';
+      for (const std::string& finding : findings) app::print("  " + finding);
     }
     if (result.failures.empty() || app::stop_signal() != 0) return;
     const std::uint64_t first = result.failures.begin()->first;
