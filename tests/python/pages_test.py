@@ -245,7 +245,7 @@ class PlotTest(support.FolderTest):
         self.expect_refused(["plot", "r", "--format", "csv"], "--format: invalid choice: 'csv'")
         self.expect_refused(["nonsense"], "invalid choice: 'nonsense'")
         self.expect_refused(["study", "--reuse", "--recordings", "empty", "--out", "s"],
-                            "empty/figure_eight: expected a recording")
+                            "empty/figure_eight_1ms: expected a recording")
 
     def test_only_the_view_turns_z_up_and_stays_right_handed(self):
         axes = figures.to_z_up(np.eye(3))
