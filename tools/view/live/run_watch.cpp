@@ -29,8 +29,7 @@ void RunWatch::note(const SimStatus& status) {
   if (last_reasons_.size() >= kMostRuns && last_reasons_.count(status.run_id()) == 0)
     last_reasons_.clear();
   std::string& last = last_reasons_[status.run_id()];
-  // While it waits, the status says what for: later that would read as if it were so still.
-  if (reason.empty() || reason == last || status.phase() == RunPhase::PHASE_WAITING) return;
+  if (reason.empty() || reason == last) return;
   last = reason;
   events_.push_back({status.run_id(), status.step(), std::move(reason)});
   if (events_.size() > kMostEvents) events_.pop_front();

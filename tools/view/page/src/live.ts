@@ -214,6 +214,7 @@ class Live {
     const key = `${event.run_id} ${event.step} ${event.text}`;
     if (this.events.has(key)) return; // every connection sends the past events again
     this.events.add(key);
+    if (/not ready$/.test(event.text)) return; // the status says it while it is so
     addEvent(event);
     this.history?.events.push(event);
     this.marks = [...this.marks.slice(1 - kMostMarks), { time: event.sim_time_s, text: event.text, kind: kindOf(event.text) }];
