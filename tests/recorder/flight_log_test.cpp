@@ -213,7 +213,7 @@ TEST_F(FlightLogTest, ListsStagesAndEvents) {
        {"synthetic: finished", "0123456789abcdef", "quadrotor 1.5 kg", "load 0.2 kg", "rod 1 m",
         "9.8 m/s²", "period 0.004 s", "step 0.001 s", "lockstep", "300 steps", "1.2 s simulated",
         "states resent 11", "fault 12", "timing: exact", "fail-safe 0", "round trip p50 81.2 µs",
-        "recorder: all is well", "step 300 (1.2 s)", "mission finished"})
+        "recorder: all is well", "step 300 (1.2 s)", "mission\\x0afinished"})
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   const auto events = text.substr(text.find("Events\n") + 7);
   EXPECT_EQ(std::count(events.begin(), events.end(), '\n'), 4) << events;

@@ -75,7 +75,7 @@ MUTANTS = [
      "no server yields"),
     ("sim_server/core/participants/claim.hpp", "return listened >= kClaimTime ||", "return true || listened >= kClaimTime ||", "a server does not listen"),
     ("sim_server/core/participants/claim.hpp", "is_on_this_machine && has_heard_every_claim)", "is_on_this_machine)", "claims of others are not waited for"),
-    ("sim_server/core/participants/preparation.cpp", "std::runtime_error(rival)", "std::runtime_error(\"\")", "a server that yields says no reason"),
+    ("sim_server/core/participants/preparation.cpp", "std::runtime_error(rival + around.describe_other_flight())", "std::runtime_error(\"\")", "a server that yields says no reason"),
     ("sim_server/core/participants/gathering.cpp", "if (missing_.empty()) return Finding::kReady;", "return Finding::kReady;", "the flight begins without its participants"),
     ("sim_server/core/participants/gathering.cpp", "patience_.is_over(now) ? Finding::kGivenUp : Finding::kMissing", "Finding::kMissing", "missing participants are waited for forever"),
     ("sim_server/core/participants/roster.cpp", "if (ready < expected.controllers) without.push_back(id);", "", "no controller is waited for"),

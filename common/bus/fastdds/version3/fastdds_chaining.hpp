@@ -21,12 +21,23 @@ class ChainedTransport : public rtps::ChainingTransport {
     return low_level_transport_->get_configuration();
   }
 
+  /// One channel sends to all addresses. The transport below does not recognise its own channel
+  /// inside ours: it would open one for each participant, and each message would go out as often.
+  bool OpenOutputChannel(rtps::SendResourceList& channels,
+                         const rtps::Locator_t& address) override {
+    is_open_ = is_open_ || ChainingTransport::OpenOutputChannel(channels, address);
+    return is_open_ && IsLocatorSupported(address);
+  }
+
   bool send(rtps::SenderResource* below, const std::vector<rtps::NetworkBuffer>& buffers,
             std::uint32_t bytes, eprosima::fastdds::rtps::LocatorsIterator* first,
             eprosima::fastdds::rtps::LocatorsIterator* last,
             const std::chrono::steady_clock::time_point& deadline) override {
     return below->send(buffers, bytes, first, last, deadline);
   }
+
+ private:
+  bool is_open_ = false;
 };
 
 }  // namespace sls::bus
