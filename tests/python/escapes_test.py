@@ -62,9 +62,9 @@ class EscapesTest(support.FolderTest):
         yield self.run_program("sls_verify", "r")
         yield self.run_program("sls_verify", "whole", "r")
         yield self.run_program("sls_convert", "r", "--out=r.mcap", "--force")
-        with mock.patch("sls.__main__.make_figures", return_value={}):
+        with mock.patch("sls.figures.make_figures", return_value={}):
             yield self.run_sls("plot", "r")[1]
-        with mock.patch("sls.__main__.make_report", lambda recording, _: say(
+        with mock.patch("sls.report.make_report", lambda recording, _: say(
                 f"{recording!r} {recording.list_events()} {recording.list_notes()}") or ""):
             yield self.run_sls("report", "r")[1]
 

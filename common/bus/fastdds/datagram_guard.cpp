@@ -181,7 +181,6 @@ const char* judge_fragment(const Fields& fields) {
   constexpr std::size_t kNumber = 12, kFirst = 20, kCount = 24, kFragment = 26, kSample = 28,
                         kEnd = 32;
   if (!fields.has(0, kEnd)) return "a fragment that is cut off";
-  if (has_tokens(fields.read_entity(8))) return "a fragment of an announcement";
   const std::uint64_t first = fields.read(kFirst, 4), count = fields.read(kCount, 2),
                       bytes = fields.read(kFragment, 2), sample = fields.read(kSample, 4);
   if (sample == 0 || sample > kMostSampleBytes) return "a fragment of a sample of impossible size";

@@ -73,8 +73,6 @@ TEST(DatagramGuardTest, HarmfulMessagesAreRefused) {
        "a fragment beyond its sample"},
       {"of nothing", kFragment + "010000000100000000080000" + zeros(4),
        "a fragment beyond its sample"},
-      {"of an announcement", replace(kFragment, kEntities, kAnnouncer) + zeros(16),
-       "a fragment of an announcement"},
       {"identity", kIdentity, ""},
       {"of 4 GB", replace(kIdentity, kToken.substr(0, 8), "ffffffff"), too_long},
       {"of 2^31 properties", replace(kIdentity, "61626300010000", "616263000000f0"), too_long},
