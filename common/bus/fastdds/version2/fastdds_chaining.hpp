@@ -20,11 +20,14 @@ class ChainedTransport : public rtps::ChainingTransport {
   }
 
   /// One channel sends to all addresses. The transport below does not recognise its own channel
-  /// inside ours: it would open one for each participant, and each message would go out as often.
+  /// inside ours: it opens another one for each address, which is closed again. Otherwise each
+  /// message would go out as often. The transport needs each address all the same (statistics).
   bool OpenOutputChannel(rtps::SendResourceList& channels,
                          const rtps::Locator_t& address) override {
-    is_open_ = is_open_ || ChainingTransport::OpenOutputChannel(channels, address);
-    return is_open_ && IsLocatorSupported(address);
+    rtps::SendResourceList others;
+    if (is_open_) return low_level_transport_->OpenOutputChannel(others, address);
+    is_open_ = ChainingTransport::OpenOutputChannel(channels, address);
+    return is_open_;
   }
 
   bool send(rtps::SenderResource* below, const rtps::octet* buffer, std::uint32_t bytes,
