@@ -48,7 +48,7 @@ void install_stop_signals(std::chrono::seconds patience) {
   sigaction(SIGALRM, &action, nullptr);
   action.sa_handler = SIG_IGN;
   for (const int number : {SIGPIPE, SIGXFSZ}) sigaction(number, &action, nullptr);
-  // Whoever started this program may have blocked them, and a mask is inherited.
+  // A program inherits the mask of the one that started it, which may have blocked these signals.
   sigset_t heard;
   sigemptyset(&heard);
   for (const int number : {SIGINT, SIGTERM, SIGHUP, SIGALRM}) sigaddset(&heard, number);

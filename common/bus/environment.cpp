@@ -21,6 +21,7 @@
 #include <optional>
 #include <sstream>
 
+#include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/config/domain.hpp"
 #include "common/config/yaml_node.hpp"
 #include "fastdds_api.hpp"
@@ -36,11 +37,6 @@ constexpr const char* kLoopback = "127.0.0.1";
 constexpr const char* kServer = "sim_server";
 constexpr const char* kRosServer = "ROS_DISCOVERY_SERVER";
 std::atomic<bool> is_ros_server_dropped{false};
-
-std::string name_user(uid_t user) {
-  const passwd* entry = ::getpwuid(user);
-  return entry ? entry->pw_name : std::to_string(user);
-}
 
 std::string read(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
@@ -73,13 +69,13 @@ std::set<std::string> find_addresses() {
   return found;
 }
 
-/// Free descriptors among the first 4,096, counted without another one.
+/// Free descriptors, counted without another one, up to those that a start needs.
 std::size_t count_free_descriptors() {
   rlimit limit{};
   ::getrlimit(RLIMIT_NOFILE, &limit);
   std::size_t free = 0;
-  for (int i = 0; i < static_cast<int>(std::min<rlim_t>(limit.rlim_cur, 4096)); ++i)
-    if (::fcntl(i, F_GETFD) < 0) ++free;
+  for (rlim_t i = 0; i < limit.rlim_cur && free < kDescriptorsAtStart; ++i)
+    if (::fcntl(static_cast<int>(i), F_GETFD) < 0) ++free;
   return free;
 }
 
@@ -115,6 +111,11 @@ std::string describe_addresses(const Environment& seen) {
 
 }  // namespace
 
+std::string name_user(uid_t user) {
+  const passwd* entry = ::getpwuid(user);
+  return entry ? entry->pw_name : std::to_string(user);
+}
+
 void drop_foreign_variables() {
   if (is_ros_server_ignored()) is_ros_server_dropped = true;
   for (const char* name :
@@ -137,17 +138,10 @@ std::string find_shared_memory_defect(const fs::path& folder) {
 
 DomainUsers find_domain_users(const Environment& given, const fs::path& table) {
   DomainUsers users;
-  std::ifstream lines(table);
-  for (std::string line; std::getline(lines, line);) {
-    std::istringstream stream(line);  // "42: 0100007F:1CF2 …", the user is the eighth word
-    const std::vector<std::string> words(std::istream_iterator<std::string>(stream), {});
-    const auto colon = words.size() < 8 ? std::string::npos : words[1].find(':');
-    if (colon == std::string::npos) continue;
-    const int offset =
-        static_cast<int>(std::strtol(words[1].c_str() + colon + 1, nullptr, 16)) - given.port_base;
-    if (offset < 0 || offset / given.domain_gain > config::kMaxDomain) continue;
-    users[offset / given.domain_gain].insert(
-        static_cast<uid_t>(std::strtoul(words[7].c_str(), nullptr, 10)));
+  for (const UdpPort& udp : read_udp_ports(table)) {
+    const int offset = udp.port - given.port_base;
+    if (offset >= 0 && offset / given.domain_gain <= config::kMaxDomain)
+      users[offset / given.domain_gain].insert(udp.user);
   }
   return users;
 }

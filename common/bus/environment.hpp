@@ -52,6 +52,9 @@ std::string find_cause(const Environment& seen, bool is_start = false);
 /// on this domain. With `is_elsewhere` a program of this user on another one, without advice.
 std::string describe_other_flight(const Environment& seen, bool is_elsewhere = false);
 
+/// The name of a user, or the number of one without a name.
+std::string name_user(uid_t user);
+
 /// Removes the variables of the environment that change what Fast DDS does: only --qos counts.
 void drop_foreign_variables();
 /// True if ROS_DISCOVERY_SERVER is set, or was when it was dropped.

@@ -14,8 +14,9 @@ DOMAINS = range(100, 161)
 @contextmanager
 def own_domain() -> Iterator[int]:
     """Context with a DDS domain that no other campaign or check on this machine uses. An abstract socket with the
-    domain's number marks it as used; the socket disappears with its process. Afterwards the domain's ports in shared
-    memory, whose numbers end with those of UDP (common/bus/fastdds/host_id.hpp), are removed, which processes that were killed leave behind."""
+    domain's number marks it as used; the socket disappears with its process. Afterwards it removes the domain's ports
+    in shared memory, which killed processes leave behind. Their numbers end with those of UDP
+    (common/bus/fastdds/host_id.hpp)."""
     for number in DOMAINS:
         lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         try:
@@ -26,7 +27,7 @@ def own_domain() -> Iterator[int]:
         try:
             yield number
         finally:
-            # None there, or read-only: the programs say what they need.
+            # If /dev/shm is missing or read-only, the programs say so.
             for file in Path("/dev/shm").glob("*fast*_port*"):
                 port = re.match(r"(?:sem\.)?fast(?:rtps|dds)_port(\d+)", file.name)
                 if port and 0 <= (int(port[1]) & 0xFFFF) - 7400 - 250 * number < 250:

@@ -1,6 +1,5 @@
 #include "tools/doctor/doctor.hpp"
 
-#include <pwd.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -8,6 +7,7 @@
 #include <optional>
 #include <thread>
 
+#include "common/bus/environment.hpp"
 #include "common/bus/node.hpp"
 #include "tools/doctor/diagnosis.hpp"
 #include "tools/doctor/other_end.hpp"
@@ -30,11 +30,6 @@ constexpr auto kConnectTime = std::chrono::seconds(1);
 constexpr auto kAskInterval = std::chrono::milliseconds(500);
 constexpr auto kPause = std::chrono::milliseconds(5);
 constexpr const char* kLoopback = "127.0.0.1";
-
-std::string find_user() {
-  const passwd* entry = ::getpwuid(::geteuid());
-  return entry ? entry->pw_name : std::to_string(::geteuid());
-}
 
 /// Address for probes to programs of this machine.
 std::string choose_own_address(const Settings& settings) {
@@ -106,7 +101,7 @@ class Examination {
     Observations seen;
     seen.qos_file = options.qos_file.filename().string();
     seen.domain = options.domain;
-    seen.user = find_user();
+    seen.user = bus::name_user(::geteuid());
     seen.settings = load_settings(options.qos_file, options.domain, options.identity);
     seen.shared_memory = survey_shared_memory();
     seen.peer = options.peer;

@@ -1,6 +1,5 @@
 #include "tools/doctor/shared_memory.hpp"
 
-#include <pwd.h>
 #include <sys/stat.h>
 #include <sys/statvfs.h>
 #include <unistd.h>
@@ -14,15 +13,6 @@
 #include "fastdds_files.hpp"
 
 namespace sls::doctor {
-namespace {
-
-std::string find_user_name(uid_t user) {
-  const passwd* entry = ::getpwuid(user);
-  return entry ? entry->pw_name : std::to_string(user);
-}
-
-}  // namespace
-
 SharedMemory survey_shared_memory(const std::filesystem::path& folder) {
   SharedMemory found;
   struct statvfs room {};
@@ -37,7 +27,7 @@ SharedMemory survey_shared_memory(const std::filesystem::path& folder) {
     if (::stat(segment.c_str(), &status) != 0) continue;
     constexpr std::uint64_t kBlock = 512;  // unit of st_blocks on every file system
     found.stale_size += static_cast<std::uint64_t>(status.st_blocks) * kBlock;
-    const std::string owner = find_user_name(status.st_uid);
+    const std::string owner = bus::name_user(status.st_uid);
     auto& owners = found.stale_owners;
     if (std::find(owners.begin(), owners.end(), owner) == owners.end()) owners.push_back(owner);
   }

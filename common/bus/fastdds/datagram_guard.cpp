@@ -130,13 +130,15 @@ bool has_tokens(std::uint32_t writer) {
 
 /// `payload` is a list of parameters: number, length, content.
 bool are_tokens_whole(const Fields& payload) {
-  constexpr std::uint64_t kEnd = 0x0001, kIdentity = 0x1001, kIdentityStatus = 0x1006;
+  constexpr std::uint64_t kEnd = 0x0001, kFirstToken = 0x1001, kLastToken = 0x1006,
+                          kEndpointFlags = 0x1004, kParticipantFlags = 0x1005;  // of DDS Security
   for (std::size_t place = 0; payload.has(place, 4);) {
     const std::uint64_t number = payload.read(place, 2), length = payload.read(place + 2, 2);
     if (number == kEnd) return true;
     place += 4;
     if (!payload.has(place, length)) return false;
-    if (number >= kIdentity && number <= kIdentityStatus && number != 0x1004 && number != 0x1005) {
+    if (number >= kFirstToken && number <= kLastToken && number != kEndpointFlags &&
+        number != kParticipantFlags) {
       Tokens tokens(payload.part(place, length, payload.is_little()));
       tokens.skip_token();
       if (!tokens.is_whole()) return false;
@@ -241,11 +243,7 @@ DatagramVerdict judge_datagram(const std::uint8_t* data, std::size_t size) {
 bool RefusedDatagrams::note(const std::string& address) {
   const std::lock_guard lock(mutex_);
   ++count_;
-  const auto known = by_sender_.find(address);
-  if (known != by_sender_.end()) return ++known->second == 0;
-  if (by_sender_.size() >= kMostSenders) return false;
-  by_sender_[address] = 1;
-  return true;
+  return senders_.size() < kMostSenders && senders_.insert(address).second;
 }
 
 std::uint64_t RefusedDatagrams::count() const {

@@ -1,14 +1,15 @@
-/// Refuses datagrams that make Fast DDS abort, hang or take gigabytes, whoever sends them and
-/// whatever the security: it reads them before it decrypts them (README.md, trap 45).
+/// Refuses datagrams that make Fast DDS abort, hang or take gigabytes. Any host can send them, also
+/// to a secured flight: Fast DDS reads these fields before it decrypts a message (README.md, trap
+/// 46).
 ///
-/// Upstream: none reported. To be deleted when Fast DDS checks these fields itself; the seeds of
-/// tests/fuzz and tests/common/bus/fastdds/datagram_guard_test.cpp name the cases.
+/// Upstream: none reported. To be deleted when Fast DDS checks these fields itself;
+/// datagram_guard_test.cpp names the cases.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
-#include <map>
 #include <mutex>
+#include <set>
 #include <string>
 
 namespace sls::bus {
@@ -41,7 +42,7 @@ class RefusedDatagrams {
 
  private:
   mutable std::mutex mutex_;
-  std::map<std::string, std::uint64_t> by_sender_;
+  std::set<std::string> senders_;
   std::uint64_t count_ = 0;
 };
 

@@ -2,22 +2,29 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 #include <sstream>
 
 namespace sls::bus {
 
+std::vector<UdpPort> read_udp_ports(const std::filesystem::path& table) {
+  std::vector<UdpPort> found;
+  std::ifstream lines(table);
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream stream(line);  // "42: 0100007F:1CF2 …", the user is the eighth word
+    const std::vector<std::string> words(std::istream_iterator<std::string>(stream), {});
+    const auto colon = words.size() < 8 ? std::string::npos : words[1].find(':');
+    if (colon == std::string::npos) continue;
+    found.push_back({static_cast<int>(std::strtol(words[1].c_str() + colon + 1, nullptr, 16)),
+                     static_cast<uid_t>(std::strtoul(words[7].c_str(), nullptr, 10))});
+  }
+  return found;
+}
+
 std::set<int> find_open_ports(const ParticipantPorts& ports, const std::filesystem::path& table) {
   std::set<int> open;
-  std::ifstream lines(table);
-  std::string line;
-  while (std::getline(lines, line)) {
-    std::istringstream words(line);
-    std::string number, local;  // "42:" and "0100007F:1CF2"
-    words >> number >> local;
-    const auto colon = local.find(':');
-    if (colon == local.npos) continue;
-    const int offset =
-        static_cast<int>(std::strtol(local.c_str() + colon + 1, nullptr, 16)) - ports.base;
+  for (const UdpPort& udp : read_udp_ports(table)) {
+    const int offset = udp.port - ports.base;
     if (offset >= 0 && offset % ports.gain == 0 && offset / ports.gain < kMaxParticipantIds)
       open.insert(ports.base + offset);
   }

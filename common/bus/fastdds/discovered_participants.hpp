@@ -3,17 +3,29 @@
 /// when it does.
 #pragma once
 
+#include <sys/types.h>
+
 #include <cstddef>
 #include <filesystem>
 #include <map>
 #include <mutex>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/peer.hpp"
 
 namespace sls::bus {
+
+/// A UDP socket in this network namespace.
+struct UdpPort {
+  int port = 0;
+  uid_t user = 0;  ///< its owner
+};
+
+/// The UDP sockets in `table`, as the kernel writes it. Empty if it cannot be read.
+std::vector<UdpPort> read_udp_ports(const std::filesystem::path& table);
 
 /// Ports of participants (of `ports`, without the number after each) at which a UDP socket is open
 /// in this network namespace. `table`: as the kernel writes it. Empty if it cannot be read.

@@ -17,6 +17,30 @@ namespace {
 
 using Receiver = rtps::TransportReceiverInterface;
 
+/// A transport on top of another one.
+class ChainedTransport : public SendingTransport {
+ public:
+  using SendingTransport::SendingTransport;
+
+  rtps::TransportDescriptorInterface* get_configuration() override {
+    return low_level_transport_->get_configuration();
+  }
+
+  /// One channel sends to all addresses. The transport below does not recognise its own channel
+  /// inside ours: it opens another one for each address, which is closed again. Otherwise each
+  /// message would go out as often. The transport needs each address all the same (statistics).
+  bool OpenOutputChannel(rtps::SendResourceList& channels,
+                         const rtps::Locator_t& address) override {
+    rtps::SendResourceList others;
+    if (is_open_) return low_level_transport_->OpenOutputChannel(others, address);
+    is_open_ = ChainingTransport::OpenOutputChannel(channels, address);
+    return is_open_;
+  }
+
+ private:
+  bool is_open_ = false;
+};
+
 class GuardedUdp : public ChainedTransport {
  public:
   using ChainedTransport::ChainedTransport;
@@ -31,9 +55,8 @@ class GuardedUdp : public ChainedTransport {
     static RefusedDatagrams refused;
     const std::string address = rtps::IPLocator::toIPv4string(remote);
     if (refused.note(address))
-      spdlog::warn(
-          "{}: expected RTPS messages, got {}: refused, and what else it sends of the kind",
-          address, verdict.defect);
+      spdlog::warn("{}: expected RTPS messages, got {}: refuses such datagrams", address,
+                   verdict.defect);
   }
 };
 

@@ -1,6 +1,6 @@
 /// Shared memory is for programs with the same build of Fast DDS. Another build, of a ROS 2 node
 /// for example, lays its segments out otherwise, and a process that opens one of them aborts by an
-/// assertion of Boost, or misreads it (README.md, trap 44).
+/// assertion of Boost, or misreads it (README.md, trap 45).
 ///
 /// An address in shared memory contains a number of the host. So ours contain a number that depends
 /// on the build, too: each build takes the addresses of another for those of another host, in both

@@ -54,7 +54,7 @@ bool has_ended(const std::string& process) {
       number.find_first_not_of("0123456789") != number.npos)
     return false;
   std::error_code error;
-  std::filesystem::read_symlink("/proc/" + number + "/exe", error);
+  static_cast<void>(std::filesystem::read_symlink("/proc/" + number + "/exe", error));
   return error == std::errc::no_such_file_or_directory;
 }
 

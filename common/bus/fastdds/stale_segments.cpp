@@ -10,7 +10,7 @@
 
 #include "common/bus/fastdds/file_lock.hpp"
 #include "common/bus/fastdds/guarded_transports.hpp"
-#include "fastdds_files.hpp"
+#include "common/bus/fastdds/segment_names.hpp"
 
 namespace sls::bus {
 namespace {
@@ -26,14 +26,7 @@ bool begins_with(std::string_view name, std::string_view prefix) {
   return name.substr(0, prefix.size()) == prefix;
 }
 
-/// The prefix and sixteen hexadecimal digits: a participant's segment.
-bool is_segment(std::string_view name) {
-  constexpr std::size_t kDigits = 16;
-  return name.size() == kSegmentPrefix.size() + kDigits && begins_with(name, kSegmentPrefix) &&
-         name.find_first_not_of("0123456789abcdef", kSegmentPrefix.size()) == name.npos;
-}
-
-/// The same with "_el": its lock file.
+/// The lock file of a participant's segment: its name and "_el".
 bool is_segment_lock(std::string_view name) {
   return name.size() > kLock.size() && name.substr(name.size() - kLock.size()) == kLock &&
          is_segment(name.substr(0, name.size() - kLock.size()));
@@ -47,8 +40,9 @@ bool is_made_in_steps(std::string_view name) {
           name.find_first_not_of("0123456789", port.size()) == name.npos);
 }
 
-/// True if the process that made the file has finished it: its first number, an atomic one of
-/// Boost.Interprocess, says so. Whoever opens an unfinished file waits for that process, for ever.
+/// True if the process that made the file has finished it. Boost.Interprocess keeps this state in
+/// the first number of the file. A process that opens an unfinished file waits for its maker: for
+/// ever, if that one was killed.
 bool is_finished(const fs::path& file) {
   constexpr std::uint32_t kInitialised = 2;
   std::uint32_t state = 0;

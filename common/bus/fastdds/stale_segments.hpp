@@ -23,9 +23,9 @@ inline constexpr std::uint32_t kMostSharedData = 5'500'000;
 
 /// Removes the shared-memory segments of killed processes, their memory for data sharing, and what
 /// they had not finished when they were killed. Otherwise these files, 4 MB and more, would stay
-/// until the machine restarts, and with a full /dev/shm the next process would crash; and whoever
-/// opens an unfinished port waits for ever. Those of living processes, which hold a lock, and of
-/// other users stay. Never throws.
+/// until the machine restarts. With a full /dev/shm the next process would crash, and a process
+/// that opens an unfinished port waits for ever. Those of living processes, which hold a lock, and
+/// of other users stay. Never throws.
 void remove_stale_segments(const std::filesystem::path& folder = "/dev/shm");
 
 /// The segments that `remove_stale_segments` would remove, of all owners.

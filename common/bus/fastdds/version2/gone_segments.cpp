@@ -23,19 +23,14 @@
 #include <string>
 #include <string_view>
 
-#include "fastdds_files.hpp"
+#include "common/bus/fastdds/segment_names.hpp"
 
 namespace sls::bus {
 namespace {
 
-/// True for the name of a participant's segment: "/", the prefix and sixteen hexadecimal digits.
-bool is_segment(std::string_view name) {
-  constexpr std::string_view kPrefix = kSharedMemoryPrefix;
-  constexpr std::size_t kDigits = 16;
-  if (name.empty() || name.front() != '/') return false;
-  name.remove_prefix(1);
-  return name.size() == kPrefix.size() + kDigits && name.substr(0, kPrefix.size()) == kPrefix &&
-         name.find_first_not_of("0123456789abcdef", kPrefix.size()) == name.npos;
+/// True for the name of a participant's segment as shm_open gets it: with a "/" before it.
+bool is_segment_path(std::string_view name) {
+  return !name.empty() && name.front() == '/' && is_segment(name.substr(1));
 }
 
 using Open = int (*)(const char*, int, mode_t);
@@ -87,7 +82,7 @@ int copy_own_segment() {
 extern "C" int shm_open(const char* name, int flags, mode_t mode) {
   using namespace sls::bus;
   const int descriptor = find_original()(name, flags, mode);
-  if (!is_segment(name)) return descriptor;
+  if (!is_segment_path(name)) return descriptor;
   if (descriptor >= 0 && (flags & O_CREAT) != 0) {
     OwnSegment& own = own_segment();
     const std::lock_guard lock(own.mutex);

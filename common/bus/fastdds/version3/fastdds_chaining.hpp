@@ -1,4 +1,5 @@
-/// A transport on top of another one that sends through that one unchanged. Fast DDS 3.
+/// A transport on top of another one, through which it sends unchanged: the function of it whose
+/// arguments differ between the versions. Fast DDS 3.
 #pragma once
 
 #include <fastdds/rtps/transport/ChainingTransport.hpp>
@@ -13,24 +14,9 @@
 
 namespace sls::bus {
 
-class ChainedTransport : public rtps::ChainingTransport {
+class SendingTransport : public rtps::ChainingTransport {
  public:
   using ChainingTransport::ChainingTransport;
-
-  rtps::TransportDescriptorInterface* get_configuration() override {
-    return low_level_transport_->get_configuration();
-  }
-
-  /// One channel sends to all addresses. The transport below does not recognise its own channel
-  /// inside ours: it opens another one for each address, which is closed again. Otherwise each
-  /// message would go out as often. The transport needs each address all the same (statistics).
-  bool OpenOutputChannel(rtps::SendResourceList& channels,
-                         const rtps::Locator_t& address) override {
-    rtps::SendResourceList others;
-    if (is_open_) return low_level_transport_->OpenOutputChannel(others, address);
-    is_open_ = ChainingTransport::OpenOutputChannel(channels, address);
-    return is_open_;
-  }
 
   bool send(rtps::SenderResource* below, const std::vector<rtps::NetworkBuffer>& buffers,
             std::uint32_t bytes, eprosima::fastdds::rtps::LocatorsIterator* first,
@@ -38,9 +24,6 @@ class ChainedTransport : public rtps::ChainingTransport {
             const std::chrono::steady_clock::time_point& deadline) override {
     return below->send(buffers, bytes, first, last, deadline);
   }
-
- private:
-  bool is_open_ = false;
 };
 
 }  // namespace sls::bus

@@ -40,7 +40,7 @@ const std::string kEntities = "000001c7000001c2", kAnnouncer = "00000000000100c2
 const std::string kOne = "0000000001000000", kFive = "0000000005000000", kSix = "0000000006000000",
                   kDistant = "0100000001000000", kEndless = "ffffff7fffffffff";
 const std::string kHeartbeat = "07011c00" + kEntities, kGap = "08011c00" + kEntities,
-                  kFragment = "1601240000001c00" + kEntities + kOne, kCount = "01000000",
+                  kFragment = "1601240000001c00" + kEntities + kOne, kRest = "01000000",
                   kStatistics = "80013800" + zeros(56);
 // The token "abc" with one property "x": "y" and no bytes, and messages that end with it.
 const std::string kToken = "040000006162630001000000020000007800000002000000790000" + zeros(5),
@@ -55,10 +55,10 @@ TEST(DatagramGuardTest, HarmfulMessagesAreRefused) {
     std::string submessages, defect;
   };
   const Case cases[] = {
-      {"heartbeat", kHeartbeat + kOne + kFive + kCount, ""},
-      {"of an empty history", kHeartbeat + kSix + kFive + kCount, ""},
-      {"of a distant sample", kHeartbeat + kDistant + kDistant + kCount, "a HEARTBEAT without end"},
-      {"of a distant end", kHeartbeat + kOne + kEndless + kCount, "a HEARTBEAT without end"},
+      {"heartbeat", kHeartbeat + kOne + kFive + kRest, ""},
+      {"of an empty history", kHeartbeat + kSix + kFive + kRest, ""},
+      {"of a distant sample", kHeartbeat + kDistant + kDistant + kRest, "a HEARTBEAT without end"},
+      {"of a distant end", kHeartbeat + kOne + kEndless + kRest, "a HEARTBEAT without end"},
       {"big-endian", "0700001c" + kEntities + "0000000100000001000000010000000500000001",
        "a HEARTBEAT without end"},
       {"short", "07011800" + kEntities + kOne + kFive, "a HEARTBEAT that is cut off"},
@@ -103,7 +103,7 @@ TEST(DatagramGuardTest, StatisticsAtTheEndAreCutOff) {
 TEST(DatagramGuardTest, NothingBeyondADatagramIsRead) {
   std::mt19937_64 random(1);
   std::vector<Bytes> known;
-  for (const std::string& one : {kHeartbeat + kOne + kFive + kCount, kGap + kOne + kSix + zeros(4),
+  for (const std::string& one : {kHeartbeat + kOne + kFive + kRest, kGap + kOne + kSix + zeros(4),
                                  kFragment + zeros(16), kIdentity, kHandshake, kStatistics})
     known.push_back(make_message(one));
   for (int i = 0; i < 20'000; ++i) {
