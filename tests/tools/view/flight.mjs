@@ -55,7 +55,7 @@ export async function startFlight({ base = "figure_eight", change = (text) => te
     },
     /** The run's status from sim_ctl, independent of the page. */
     status() {
-      const result = spawnSync(join(bin, "sim_ctl"), ["--domain", domain, "status", "--json"], { encoding: "utf8" });
+      const result = spawnSync(join(bin, "sim_ctl"), ["--domain", domain, "--timeout-s", "20", "status", "--json"], { encoding: "utf8" });
       if (result.status !== 0) throw new Error(`sim_ctl: ${result.stderr}`);
       return JSON.parse(result.stdout);
     },

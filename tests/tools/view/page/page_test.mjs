@@ -8,7 +8,9 @@ import { kLean, open, readPixels, startBrowser, waitFor } from "./browser.mjs";
 
 const kColours = { quad: [0x1f, 0x84, 0xd6], load: [0xe0, 0x86, 0x00] };
 const kTolerance = 6; // of 255: a smooth edge is far from it, a rounded colour is not
-const kPlaces = [[0, 0], [-3, -2], [3, -2], [-3, 2], [3, 2]];
+const kReach = 4; // pixels around the centre of a body that are looked at
+const kFewest = 10; // of 81 pixels there have its colour,
+const kFarthest = 3; // and their mean is as near to its centre, in pixels
 
 let chromium, flight;
 before(async () => {
@@ -91,10 +93,15 @@ async function findMissing(page, mode) {
   // From above the quadrotor hides the load.
   for (const part of mode === "top" ? ["quad"] : ["quad", "load"]) {
     const [x, y] = projectFlat(camera, recorded[part]);
-    // A line of the path or the trail may cross the body, but not most of these places on it.
-    const colours = await readPixels(chromium.browser, png, kPlaces.map(([right, down]) => [x + right, y + down]));
-    const right = colours.filter((colour) => colour.every((value, index) => Math.abs(value - kColours[part][index]) <= kTolerance));
-    if (right.length < 3) return `${mode}: ${part} at ${[x, y]}: expected ${kColours[part]}, got ${colours.join("  ")}`;
+    // Lines of path, trail and reference may cross the body: then they cover a part of it, not all, and none of one side alone.
+    const places = [];
+    for (let down = -kReach; down <= kReach; ++down) for (let right = -kReach; right <= kReach; ++right) places.push([right, down]);
+    const colours = await readPixels(chromium.browser, png, places.map(([right, down]) => [x + right, y + down]));
+    const shown = places.filter((_, i) => colours[i].every((value, channel) => Math.abs(value - kColours[part][channel]) <= kTolerance));
+    const [off, low] = [0, 1].map((axis) => shown.reduce((sum, place) => sum + place[axis], 0) / shown.length);
+    if (shown.length < kFewest || Math.hypot(off, low) > kFarthest) {
+      return `${mode}: ${part} at ${[x, y]}: expected ${kFewest} pixels of ${kColours[part]} around it, got ${shown.length} around ${[off, low]}`;
+    }
   }
   return null;
 }
