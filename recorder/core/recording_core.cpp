@@ -181,10 +181,12 @@ std::string RecordingCore::describe_gaps() const {
   std::string text;
   const auto append = [&](const std::string& gap) { text += (text.empty() ? "" : "; ") + gap; };
   if (!interruption_.empty()) append(interruption_);
-  if (has_run_ended() && !is_finished())
-    append(fmt::format("run {}{}{}", bus::to_string(last_status_->phase()),
-                       last_status_->reason().size() > 0 ? ": " : "",
-                       last_status_->reason().c_str()));
+  if (has_run_ended() && !is_finished()) {
+    // The server has printed the reason, and the manifest has it unless it names the interruption.
+    std::string reason = last_status_->reason().c_str();
+    if (!reason.empty()) reason = ": " + (interruption_.empty() ? "see manifest.json" : reason);
+    append(fmt::format("run {}{}", bus::to_string(last_status_->phase()), reason));
+  }
   if (!gaps_.missing().empty()) append(describe(gaps_.missing()));
   if (claims_.refused_samples > 0)
     append(fmt::format("{} samples lost because the queue was full", claims_.refused_samples));

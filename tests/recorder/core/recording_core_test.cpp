@@ -305,10 +305,10 @@ TEST_F(RecordingCoreTest, TheOutcomeIsTheRunsOrThatOfTheInterruption) {
   for (const Case& given : std::vector<Case>{
            {kRunning, "", "", "lost", "", "the run has not ended"},
            {kRunning, "", "the server is gone", "lost", "the server is gone", "the server is gone"},
-           {kFailed, "a fault", "", "failed", "a fault", "run failed: a fault"},
+           {kFailed, "a fault", "", "failed", "a fault", "run failed: see manifest.json"},
            {kFailed, "", "", "failed", "", "run failed"},
            {kFailed, "a fault", "SIGINT", "failed", "SIGINT", "SIGINT; run failed: a fault"},
-           {kReset, "by nina", "", "reset", "by nina", "run reset: by nina"},
+           {kReset, "by nina", "", "reset", "by nina", "run reset: see manifest.json"},
        }) {
     begin();
     tell(given.phase, 1, given.reason);
