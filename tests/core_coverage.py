@@ -1,6 +1,6 @@
-"""Prints how many branches of the cores their scripts take, or worlds, and those that none takes.
+"""Prints how many branches of the cores their scripts and worlds take, and those that none takes.
 
-    python3 -B tests/core_coverage.py [--build FOLDER] [--worlds A-B]
+    python3 -B tests/core_coverage.py [--build FOLDER] [--worlds A-B] [--no-scripts]
 
 A branch is one outcome of a condition in the source, as Clang counts them (packages clang and llvm): each operand of
 `&&` and `||` has two, and each label of a switch one.
@@ -19,20 +19,21 @@ CORES = ("common/sync", "control_client/core", "recorder/core", "sim_server/core
 TESTS = ("sync_test", "client_core_test", "recorder_core_test", "server_core_test", "fault_line_test")
 
 
-def run(folder: pathlib.Path, seeds: str | None) -> list[pathlib.Path]:
-    """Builds the tests of the cores, or the worlds of the seeds, with counters, and runs them. Returns the programs."""
+def run(folder: pathlib.Path, options: argparse.Namespace) -> list[pathlib.Path]:
+    """Builds the programs that were asked for, with counters, and runs them. Returns them."""
     configure = ["cmake", "--preset", "release", "-B", folder, "-DSLS_BUILD_PROGRAMS=OFF",
                  "-DCMAKE_C_COMPILER=clang", "-DCMAKE_CXX_COMPILER=clang++",
                  f"-DCMAKE_PROJECT_sls_INCLUDE={ROOT / 'tests/core_coverage.cmake'}"]
-    programs = [folder / "tests" / test for test in TESTS] if seeds is None else [folder / "bin/sls_worlds"]
-    for command in (configure, ["ninja", "-C", folder, *(program.name for program in programs)]):
+    programs = [] if options.no_scripts else [[folder / "tests" / test] for test in TESTS]
+    programs += [[folder / "bin/sls_worlds", "--seeds", options.worlds]] if options.worlds else []
+    for command in (configure, ["ninja", "-C", folder, *(program.name for program, *_ in programs)]):
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, cwd=ROOT)
-    for program in programs:
-        subprocess.run([program] if seeds is None else [program, "--seeds", seeds], check=True,
-                       stdout=subprocess.DEVNULL, env={**os.environ, "LLVM_PROFILE_FILE": f"{program}.profraw"})
-    counters = [f"{program}.profraw" for program in programs]
+    for command in programs:
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL,
+                       env={**os.environ, "LLVM_PROFILE_FILE": f"{command[0]}.profraw"})
+    counters = [f"{program}.profraw" for program, *_ in programs]
     subprocess.run(["llvm-profdata", "merge", "-o", folder / "counters", *counters], check=True)
-    return programs
+    return [program for program, *_ in programs]
 
 
 def count(folder: pathlib.Path, programs: list[pathlib.Path]) -> dict:
@@ -56,10 +57,11 @@ def count(folder: pathlib.Path, programs: list[pathlib.Path]) -> dict:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=pathlib.Path, default=ROOT / "build-coverage")
-    parser.add_argument("--worlds", metavar="A-B", help="flies worlds of these seeds instead of the scripts")
+    parser.add_argument("--worlds", metavar="A-B", help="also fly worlds of these seeds")
+    parser.add_argument("--no-scripts", action="store_true", help="count what worlds take alone")
     options = parser.parse_args()
     folder = options.build.resolve()
-    files = count(folder, run(folder, options.worlds))
+    files = count(folder, run(folder, options))
     print(f"{'file':48} {'branches':>8} {'taken':>6}")
     everything = taken = 0
     for name in sorted(files):
