@@ -224,6 +224,19 @@ TEST(ServerLockstepTest, AnAbsentControllerOfAFleetIsNamedWithItsVehicles) {
   }
 }
 
+TEST(ServerLockstepTest, TheVehicleThatHasWaitedLongestDecidesWhenToGiveUp) {
+  auto scenario = with_two_vehicles(with_policy(config::ControllerPolicy::kHold, 1));
+  scenario.sync.wait_for.timeout_s = 1.02;
+  ServerRig rig(scenario);
+  rig.join("pilot");
+  rig.answer("pilot", for_vehicles({1}));
+  rig.wait_until(1010);  // vehicle 0 is flown without answers; vehicle 1 waits since step 1
+  EXPECT_EQ(rig.phase(), Phase::kAwaitingAnswers);
+  rig.wait_until(1030);
+  EXPECT_EQ(rig.core().error(),
+            "step 1: waited 1.02 s for controller 'pilot' on box (vehicles 0-1)");
+}
+
 TEST(ServerLockstepTest, AnAwaitedControllerIsNamedWithWhatIsKnownOfIt) {
   struct Case {
     void (*happens)(ServerRig&);
