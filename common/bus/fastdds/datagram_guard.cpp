@@ -136,7 +136,10 @@ enum Writer : std::uint32_t {
   kKeys = 0xff02'02c3,
 };
 
+constexpr std::uint64_t kListEnd = 0x0001, kParticipantGuid = 0x0050;  // parameters
+
 bool is_parameter_whole(std::uint64_t number, const Fields& content) {
+  constexpr std::size_t kGuid = 16;
   Lists lists(content);
   switch (number) {
     case 0x0005:  // names of topic, type and entity
@@ -151,6 +154,10 @@ bool is_parameter_whole(std::uint64_t number, const Fields& content) {
       for (int text = 0; text < 4; ++text) lists.skip_text();
       lists.skip_texts();
       break;
+    case kParticipantGuid:  // its GUID: Fast DDS asserts that there is one
+      for (std::size_t i = 0; i < kGuid && content.has(i, 1); ++i)
+        if (content.read(i, 1) != 0) return content.has(0, kGuid);
+      return false;
     case 0x0059:  // properties
       lists.skip_texts(2);
       break;
@@ -171,13 +178,15 @@ bool is_parameter_whole(std::uint64_t number, const Fields& content) {
 }
 
 /// Length of the list of parameters at `place`, each a number, a length and content, with what ends
-/// it; 0 if it has no end or one of them is not whole.
-std::size_t measure_parameters(const Fields& fields, std::size_t place = 0) {
-  constexpr std::uint64_t kEnd = 0x0001;
+/// it; 0 if it has no end, one of them is not whole, or there is none of number `wanted`.
+std::size_t measure_parameters(const Fields& fields, std::size_t place = 0,
+                               std::uint64_t wanted = kListEnd) {
+  bool is_there = false;
   for (std::size_t at = place; fields.has(at, 4);) {
     const std::uint64_t number = fields.read(at, 2), length = fields.read(at + 2, 2);
     at += 4;
-    if (number == kEnd) return at - place;
+    is_there = is_there || number == wanted;
+    if (number == kListEnd) return is_there ? at - place : 0;
     if (!fields.has(at, length) ||
         !is_parameter_whole(number, fields.part(at, length, fields.is_little())))
       return 0;
@@ -209,18 +218,19 @@ std::size_t find_payload(const Fields& fields, std::uint8_t flags, std::size_t l
   return parameters > 0 ? place + parameters : 0;
 }
 
-enum class Announcement { kNone, kList, kTokens };
+enum class Announcement { kNone, kParticipant, kEndpoint, kTokens };
 
 /// What the writer of a DATA or a fragment sends.
 Announcement find_announcement(const Fields& fields) {
   switch (fields.read_entity(8)) {
     case kAnnouncer:
     case kSecureAnnouncer:
+      return Announcement::kParticipant;
     case kWriters:
     case kSecureWriters:
     case kReaders:
     case kSecureReaders:
-      return Announcement::kList;
+      return Announcement::kEndpoint;
     case kHandshake:
     case kKeys:
       return Announcement::kTokens;
@@ -231,13 +241,23 @@ Announcement find_announcement(const Fields& fields) {
 
 /// A whole sample at `place`.
 const char* judge_sample(const Fields& fields, std::size_t place) {
-  const Announcement kind = find_announcement(fields);
   const bool is_little = fields.has(place, 4) && (fields.read_entity(place) & 0x0001'0000) != 0;
   const Fields payload = fields.part(place + 4, fields.size(), is_little);  // of its representation
-  const bool is_whole = kind == Announcement::kNone ||
-                        (kind == Announcement::kTokens ? is_handshake_whole(payload)
-                                                       : measure_parameters(payload) > 0);
-  return is_whole ? nullptr : "a list that is longer than its message";
+  bool is_whole = true;
+  switch (find_announcement(fields)) {
+    case Announcement::kNone:
+      break;
+    case Announcement::kParticipant:
+      is_whole = measure_parameters(payload, 0, kParticipantGuid) > 0;
+      break;
+    case Announcement::kEndpoint:
+      is_whole = measure_parameters(payload) > 0;
+      break;
+    case Announcement::kTokens:
+      is_whole = is_handshake_whole(payload);
+      break;
+  }
+  return is_whole ? nullptr : "a malformed announcement";
 }
 
 const char* judge_data(const Fields& fields, std::uint8_t flags) {
@@ -268,8 +288,10 @@ const char* judge_fragment(const Fields& fields, std::uint8_t flags) {
   if (!is_number(fields.read_number(kNumber))) return "a fragment without number";
   if (first == 1 && count * bytes >= sample) return judge_sample(fields, place);
   // Only Cyclone DDS sends fragments of announcements: of the handshake.
-  return find_announcement(fields) == Announcement::kList ? "an announcement in fragments"
-                                                          : nullptr;
+  const Announcement kind = find_announcement(fields);
+  return kind == Announcement::kNone || kind == Announcement::kTokens
+             ? nullptr
+             : "an announcement in fragments";
 }
 
 const char* judge_submessage(std::uint8_t kind, std::uint8_t flags, const Fields& fields) {

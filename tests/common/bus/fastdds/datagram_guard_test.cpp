@@ -46,14 +46,15 @@ const std::string kHeartbeat = "07011c00" + kEntities, kGap = "08011c00" + kEnti
                             zeros(4);
 // The token "abc" with one property "x": "y" and no bytes, and messages that end with it.
 const std::string kToken = "040000006162630001000000020000007800000002000000790000" + zeros(5),
-                  kIdentity =
-                      "1505000000001000" + kAnnouncer + kOne + "0003000001102000" + kToken + kEnd,
+                  kGuid = "50001000" + zeros(15) + "01",
+                  kIdentity = "1505000000001000" + kAnnouncer + kOne + "00030000" + kGuid +
+                              "01102000" + kToken + kEnd,
                   kHandshake = "1505000000001000" + kHandshaker + kOne + "00010000" + zeros(96) +
                                "020000006100000001000000" + kToken;
 
 TEST(DatagramGuardTest, HarmfulMessagesAreRefused) {
-  const std::string too_long = "a list that is longer than its message",
-                    cut_off = "a DATA that is cut off", cut_fragment = "a fragment that is cut off";
+  const std::string malformed = "a malformed announcement", cut_off = "a DATA that is cut off",
+                    cut_fragment = "a fragment that is cut off";
   const auto announce = [](const std::string& parameter) {
     return "1505000000001000" + kWriters + kOne + "00030000" + parameter + kEnd;
   };
@@ -94,26 +95,28 @@ TEST(DatagramGuardTest, HarmfulMessagesAreRefused) {
       {"of nothing", kFragment + "010000000100000000080000" + zeros(4),
        "a fragment beyond its sample"},
       {"partition", announce("29000c00010000000200000061000000"), ""},
-      {"of 2^32 - 4 bytes", announce("29000c0001000000fcffffff61000000"), too_long},
-      {"topic", announce("05000800ffffffff61000000"), too_long},
-      {"filter", announce("35001400" + zeros(12) + "ffffffff61000000"), too_long},
-      {"property", announce("59000c0001000000ffffffff61000000"), too_long},
-      {"representations", announce("73000800ffffffff00000000"), too_long},
-      {"shared data", announce("06800c00020000000000000000000000"), too_long},
+      {"of 2^32 - 4 bytes", announce("29000c0001000000fcffffff61000000"), malformed},
+      {"topic", announce("05000800ffffffff61000000"), malformed},
+      {"filter", announce("35001400" + zeros(12) + "ffffffff61000000"), malformed},
+      {"property", announce("59000c0001000000ffffffff61000000"), malformed},
+      {"representations", announce("73000800ffffffff00000000"), malformed},
+      {"shared data", announce("06800c00020000000000000000000000"), malformed},
       {"in one fragment",
        replace(kFragment, kEntities, kWriters) +
            "0100000001001000100000000003000005000800ffffffff00000000",
-       too_long},
+       malformed},
       {"in two",
        replace(kFragment, kEntities, kWriters) +
            "0100000001001000180000000003000005000800ffffffff00000000",
        "an announcement in fragments"},
       {"identity", kIdentity, ""},
-      {"of 4 GB", replace(kIdentity, kToken.substr(0, 8), "ffffffff"), too_long},
-      {"of 2^31 properties", replace(kIdentity, "61626300010000", "616263000000f0"), too_long},
-      {"longer than its announcement", replace(kIdentity, "01102000", "01102400"), too_long},
+      {"of 4 GB", replace(kIdentity, kToken.substr(0, 8), "ffffffff"), malformed},
+      {"of nobody", replace(kIdentity, kGuid, "50001000" + zeros(16)), malformed},
+      {"without participant", replace(kIdentity, kGuid, ""), malformed},
+      {"of 2^31 properties", replace(kIdentity, "61626300010000", "616263000000f0"), malformed},
+      {"longer than its announcement", replace(kIdentity, "01102000", "01102400"), malformed},
       {"handshake", kHandshake, ""},
-      {"of 2^31 tokens", replace(kHandshake, "6100000001000000", "61000000000000f0"), too_long},
+      {"of 2^31 tokens", replace(kHandshake, "6100000001000000", "61000000000000f0"), malformed},
       {"statistics in the middle", kStatistics + "01010000",
        "statistics in the middle of a message"},
       {"longer than the message", "15010001" + zeros(8), "a submessage that is cut off"},
