@@ -7,7 +7,8 @@ namespace sls::bus {
 namespace {
 
 // RTPS 2.5, sections 8.3 and 9.4: the header and the submessages.
-constexpr std::size_t kHeader = 20, kSubmessageHeader = 4, kBitmapBits = 256;
+constexpr std::size_t kHeader = 20, kSubmessageHeader = 4, kBitmapBits = 256,
+                      kWriter = 8;  // place in a DATA or a fragment
 enum Submessage : std::uint8_t {
   kPad = 0x01,
   kAckNack = 0x06,
@@ -123,18 +124,18 @@ const char* judge_heartbeat(const Fields& fields) {
   return nullptr;
 }
 
-/// What announces participants and endpoints, also to secured readers, which accept it unprotected,
-/// and messages of the handshake. Fast DDS takes as much memory as a list in them says.
-enum Writer : std::uint32_t {
-  kAnnouncer = 0x0001'00c2,
-  kSecureAnnouncer = 0xff01'01c2,
-  kWriters = 0x0000'03c2,
-  kSecureWriters = 0xff00'03c2,
-  kReaders = 0x0000'04c2,
-  kSecureReaders = 0xff00'04c2,
-  kHandshake = 0x0002'01c3,
-  kKeys = 0xff02'02c3,
-};
+// Writers of announcements, plain and secure: Fast DDS takes as much memory as a list in them says,
+// and secured readers accept them unprotected.
+bool announces_participants(std::uint32_t writer) {
+  return writer == 0x0001'00c2 || writer == 0xff01'01c2;
+}
+bool announces_endpoints(std::uint32_t writer) {
+  const std::uint32_t number = writer & 0x00ff'ffff;
+  return number == 0x03c2 || number == 0x04c2;
+}
+bool sends_tokens(std::uint32_t writer) {  // handshake, keys
+  return writer == 0x0002'01c3 || writer == 0xff02'02c3;
+}
 
 constexpr std::uint64_t kListEnd = 0x0001, kParticipantGuid = 0x0050;  // parameters
 
@@ -218,45 +219,15 @@ std::size_t find_payload(const Fields& fields, std::uint8_t flags, std::size_t l
   return parameters > 0 ? place + parameters : 0;
 }
 
-enum class Announcement { kNone, kParticipant, kEndpoint, kTokens };
-
-/// What the writer of a DATA or a fragment sends.
-Announcement find_announcement(const Fields& fields) {
-  switch (fields.read_entity(8)) {
-    case kAnnouncer:
-    case kSecureAnnouncer:
-      return Announcement::kParticipant;
-    case kWriters:
-    case kSecureWriters:
-    case kReaders:
-    case kSecureReaders:
-      return Announcement::kEndpoint;
-    case kHandshake:
-    case kKeys:
-      return Announcement::kTokens;
-    default:
-      return Announcement::kNone;
-  }
-}
-
 /// A whole sample at `place`.
 const char* judge_sample(const Fields& fields, std::size_t place) {
+  const std::uint32_t writer = fields.read_entity(kWriter);
   const bool is_little = fields.has(place, 4) && (fields.read_entity(place) & 0x0001'0000) != 0;
   const Fields payload = fields.part(place + 4, fields.size(), is_little);  // of its representation
-  bool is_whole = true;
-  switch (find_announcement(fields)) {
-    case Announcement::kNone:
-      break;
-    case Announcement::kParticipant:
-      is_whole = measure_parameters(payload, 0, kParticipantGuid) > 0;
-      break;
-    case Announcement::kEndpoint:
-      is_whole = measure_parameters(payload) > 0;
-      break;
-    case Announcement::kTokens:
-      is_whole = is_handshake_whole(payload);
-      break;
-  }
+  const bool is_whole =
+      announces_participants(writer) ? measure_parameters(payload, 0, kParticipantGuid) > 0
+      : announces_endpoints(writer)  ? measure_parameters(payload) > 0
+                                     : !sends_tokens(writer) || is_handshake_whole(payload);
   return is_whole ? nullptr : "a malformed announcement";
 }
 
@@ -288,10 +259,10 @@ const char* judge_fragment(const Fields& fields, std::uint8_t flags) {
   if (!is_number(fields.read_number(kNumber))) return "a fragment without number";
   if (first == 1 && count * bytes >= sample) return judge_sample(fields, place);
   // Only Cyclone DDS sends fragments of announcements: of the handshake.
-  const Announcement kind = find_announcement(fields);
-  return kind == Announcement::kNone || kind == Announcement::kTokens
-             ? nullptr
-             : "an announcement in fragments";
+  const std::uint32_t writer = fields.read_entity(kWriter);
+  return announces_participants(writer) || announces_endpoints(writer)
+             ? "an announcement in fragments"
+             : nullptr;
 }
 
 const char* judge_submessage(std::uint8_t kind, std::uint8_t flags, const Fields& fields) {
