@@ -123,17 +123,19 @@ class HostileTest : public HostsTest {
       flight.client->send(SIGSTOP);
       sniffer.send(SIGTERM);
       ASSERT_EQ(sniffer.wait(30s), 0);
-      Words to;
-      for (const char* host : {"controller", "recorder"})
-        for (const std::string& word : {std::string("--to"), network_->address(host)})
-          to.push_back(word);
-      Process& attacker = attack("mutations", flight, "attacker",
-                                 to + Words{"--file", folder / "packets", "--most", "1000000",
-                                            "--seed", std::to_string(seed)});
+      Process& attacker = attack(
+          "mutations", flight, "attacker",
+          {"--to", network_->address("controller"), "--to", network_->address("recorder"), "--file",
+           folder / "packets", "--most", "1000000", "--seed", std::to_string(seed)});
       wait_until_all_fire(flight);
       expect_undisturbed(flight, 55 + 64);
       attacker.send(SIGTERM);
       ASSERT_EQ(attacker.wait(30s), 0) << attacker.output();
+      const std::string line = network_->address("attacker") + ": expected RTPS messages";
+      for (const auto* program : {&flight.server, &flight.client, &flight.recorder}) {
+        const std::string said = (*program)->output();
+        EXPECT_EQ(said.find(line), said.rfind(line)) << said;
+      }
       fired += std::stoull(attacker.output().substr(attacker.output().find(": ") + 2));
     }
   }
