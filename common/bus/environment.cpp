@@ -40,7 +40,9 @@ std::atomic<bool> is_ros_server_dropped{false};
 
 std::string read(const fs::path& file) {
   std::ifstream stream(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(stream), {}};
+  std::ostringstream text;  // its operator catches: a process may end while its file is read
+  text << stream.rdbuf();
+  return text.str();
 }
 
 /// The value of `--name VALUE` or `--name=VALUE` among words that a zero ends each.

@@ -34,6 +34,7 @@
 #include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/guarded_transports.hpp"
+#include "common/bus/fastdds/host_id.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
@@ -161,9 +162,11 @@ struct Node::Impl {
     if (wire.participant_id < 0 && has_shared_memory(qos))
       wire.participant_id = choose_participant_id(ports, find_own_participant_ids());
     ParticipantListener::Own own;
+    own.has_memory = has_shared_memory(qos);
     if (is_secured) {
       const std::filesystem::path governance = find_file(qos, kGovernance);
-      own = {true, !are_submessages_protected(governance)};
+      own.is_secured = true;
+      own.is_for_fastdds_alone = !are_submessages_protected(governance);
     }
     announce_what_discovery_lacks(qos);
     listener = std::make_unique<ParticipantListener>(own, &neighbours, &discovered);
@@ -193,6 +196,8 @@ struct Node::Impl {
   void announce_what_discovery_lacks(dds::DomainParticipantQos& qos) const {
     auto& properties = qos.properties().properties();
     properties.emplace_back(kVersionProperty, kMiddlewareVersion, true);
+    if (has_shared_memory(qos))
+      properties.emplace_back(kMemoryProperty, std::to_string(middleware_build()), true);
     if (!is_secured) return;
     properties.emplace_back(kProcessProperty, Refusals::name_process(), true);
     use_common_algorithms(qos);

@@ -5,11 +5,12 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace sls::hostile {
 
 struct Target {
-  std::string address;  ///< of the server's host
+  std::vector<std::string> addresses;  ///< of the hosts of the flight
   int domain = 0;
   std::uint64_t seed = 1;
   double seconds = 60;
@@ -24,8 +25,12 @@ void say_that_it_fires();
 
 /// Writes the RTPS packets of this host to `file`, 2,000 at most.
 std::uint64_t capture(const Target& target, const std::filesystem::path& file);
-/// Random bytes, and captured packets cut short or with bytes changed, to every port.
+/// Random bytes, and captured packets with changes, to every port.
 std::uint64_t fire_packets(const Target& target, const std::filesystem::path& captured);
+/// Sends captured packets of the current flight with changes of every kind, in the name of
+/// participants that do not exist, at most `most` of them.
+std::uint64_t fire_mutations(const Target& target, const std::filesystem::path& captured,
+                             std::uint64_t most);
 /// Sends a captured participant announcement under a new GUID each time, at most `most` times.
 std::uint64_t announce_forgeries(const Target& target, const std::filesystem::path& captured,
                                  std::uint64_t most);

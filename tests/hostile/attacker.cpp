@@ -34,18 +34,19 @@ int main(int argc, char** argv) {
   std::string attack, file;
   std::uint64_t most = 3000;
   cli.add_option("ATTACK", attack)->required();
-  cli.add_option("--to", target.address, "host of the server");
+  cli.add_option("--to", target.addresses, "a host of the flight");
   cli.add_option("--domain", target.domain);
   cli.add_option("--seed", target.seed);
   cli.add_option("--seconds", target.seconds, "at most");
   cli.add_option("--file", file, "captured packets");
-  cli.add_option("--most", most, "forged participants");
+  cli.add_option("--most", most, "forged participants, changed packets");
   CLI11_PARSE(cli, argc, argv);
 
   const std::map<std::string, std::function<std::uint64_t()>> attacks = {
       {"capture", [&] { return capture(target, file); }},
       {"packets", [&] { return fire_packets(target, file); }},
       {"announcements", [&] { return announce_forgeries(target, file, most); }},
+      {"mutations", [&] { return fire_mutations(target, file, most); }},
       {"spoof", [&] { return spoof(target); }},
       {"come-and-go", [&] { return come_and_go(target); }},
       {"commands", [&] { return flood_commands(target); }},

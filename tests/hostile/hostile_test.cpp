@@ -109,6 +109,37 @@ class HostileTest : public HostsTest {
 
   // --- attacks on flights with and without keys ---
 
+  /// Flies until SLS_MUTATIONS packets are fired, by default once. A participant may take 64 MB
+  /// more than without them, and names their sender once.
+  void expect_that_mutations_disturb_nothing() {
+    const char* wanted = std::getenv("SLS_MUTATIONS");
+    const std::uint64_t most = wanted ? std::stoull(wanted) : 1;
+    for (std::uint64_t fired = 0, seed = 1; fired < most && !HasFailure(); ++seed) {
+      const TemporaryFolder folder;
+      Process sniffer(network_->on("server") +
+                      Words{SLS_ATTACKER, "capture", "--file", folder / "packets"});
+      Flight flight(scenario("figure_eight"), options_);
+      ASSERT_TRUE(flight.wait_for_steps(1)) << flight.outputs();
+      flight.client->send(SIGSTOP);
+      sniffer.send(SIGTERM);
+      ASSERT_EQ(sniffer.wait(30s), 0);
+      Process& attacker = attack(
+          "mutations", flight, "attacker",
+          {"--to", network_->address("controller"), "--to", network_->address("recorder"), "--file",
+           folder / "packets", "--most", "1000000", "--seed", std::to_string(seed)});
+      wait_until_all_fire(flight);
+      expect_undisturbed(flight, 55 + 64);
+      attacker.send(SIGTERM);
+      ASSERT_EQ(attacker.wait(30s), 0) << attacker.output();
+      const std::string line = network_->address("attacker") + ": expected RTPS messages";
+      for (const auto* program : {&flight.server, &flight.client, &flight.recorder}) {
+        const std::string said = (*program)->output();
+        EXPECT_EQ(said.find(line), said.rfind(line)) << said;
+      }
+      fired += std::stoull(attacker.output().substr(attacker.output().find(": ") + 2));
+    }
+  }
+
   /// The attacks send packets of an earlier flight. They begin during this flight: earlier, such
   /// packets simulate the programs of the earlier flight, or so many participants that the real
   /// ones cannot join, and this flight would not start.
@@ -141,6 +172,10 @@ class HostileTest : public HostsTest {
 
 TEST_F(HostileTest, MalformedPacketsAndThousandsOfInventedParticipantsDisturbNothing) {
   expect_that_forgeries_disturb_nothing();
+}
+
+TEST_F(HostileTest, ChangedPacketsOfEveryKindDisturbNothing) {
+  expect_that_mutations_disturb_nothing();
 }
 
 TEST_F(HostileTest, ParticipantsThatComeAndGoDisturbNothing) {
@@ -189,6 +224,10 @@ class SecuredHostileTest : public HostileTest {
 
 TEST_F(SecuredHostileTest, MalformedPacketsAndThousandsOfInventedParticipantsDisturbNothing) {
   expect_that_forgeries_disturb_nothing();
+}
+
+TEST_F(SecuredHostileTest, ChangedPacketsOfEveryKindDisturbNothing) {
+  expect_that_mutations_disturb_nothing();
 }
 
 TEST_F(SecuredHostileTest, AProgramWithoutKeysDisturbsNothingAndReadsNothing) {

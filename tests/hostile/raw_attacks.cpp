@@ -14,6 +14,7 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "tests/hostile/attack.hpp"
@@ -44,7 +45,7 @@ class Socket {
   const int descriptor_;
 };
 
-/// Sends to every port on which the first participant of a host in the domain listens.
+/// Sends to every port on which the first participant of each host in the domain listens.
 class Gun {
  public:
   explicit Gun(const Target& target) : target_(target), socket_(AF_INET, SOCK_DGRAM, 0) {}
@@ -52,7 +53,8 @@ class Gun {
   void fire(const Bytes& packet) {
     const int base = 7400 + 250 * target_.domain;
     send("239.255.0.1", base, packet);
-    for (const int port : {base + 1, base + 10, base + 11}) send(target_.address, port, packet);
+    for (const std::string& address : target_.addresses)
+      for (const int port : {base + 1, base + 10, base + 11}) send(address, port, packet);
     say_that_it_fires();
     if (++fired_ % kBurst == 0) std::this_thread::sleep_for(1ms);
   }
@@ -96,6 +98,14 @@ class Sniffer {
   const Socket socket_;
 };
 
+void replace_all(Bytes& packet, const Bytes& old, const Bytes& by) {
+  for (auto at = packet.begin();;) {
+    at = std::search(at, packet.end(), old.begin(), old.end());
+    if (at == packet.end()) return;
+    at = std::copy(by.begin(), by.end(), at);
+  }
+}
+
 std::vector<Bytes> read_captured(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::vector<Bytes> packets;
@@ -110,17 +120,125 @@ std::vector<Bytes> read_captured(const std::filesystem::path& file) {
   return packets;
 }
 
-/// Truncates the packet, changes bytes, or both. Byte values typical of lengths are more frequent.
-void mutate(Bytes& packet, std::size_t from, std::mt19937_64& random) {
-  const auto kind = random() % 4;
-  if (kind != 0 && packet.size() > from) {
-    const std::array<std::uint8_t, 6> telling = {0x00, 0xff, 0x7f, 0x80, 0x01, 0xfe};
-    for (auto changes = 1 + random() % 8; changes > 0; --changes)
-      packet[from + random() % (packet.size() - from)] =
-          random() % 2 ? telling[random() % telling.size()] : static_cast<std::uint8_t>(random());
+/// A part of an RTPS message.
+struct Submessage {
+  std::uint8_t kind = 0, flags = 1;  // little-endian
+  Bytes content;
+};
+
+/// Changes captured messages in what RTPS says of them: kinds, flags, lengths, identifiers,
+/// numbers, parameters, order. Equal seeds make equal messages.
+class Mutator {
+ public:
+  Mutator(std::vector<Bytes> packets, std::uint64_t seed)
+      : packets_(std::move(packets)), random_(seed) {}
+
+  /// The next message, from `from` or, by default, from any one.
+  Bytes make(const Bytes* from = nullptr) {
+    const Bytes& packet = from ? *from : pick(packets_);
+    auto parts = split(packet);
+    for (auto changes = random_() % 4; changes > 0 && !parts.empty(); --changes) change(parts);
+    Bytes result(packet.begin(), packet.begin() + kRtpsHeader);
+    for (const Submessage& part : parts) {
+      std::size_t length = part.content.size();
+      if (random_() % 32 == 0) length = make_number();
+      for (const std::size_t byte :
+           {std::size_t{part.kind}, std::size_t{part.flags}, part.flags & 1 ? length : length >> 8,
+            part.flags & 1 ? length >> 8 : length})
+        result.push_back(static_cast<std::uint8_t>(byte));
+      result.insert(result.end(), part.content.begin(), part.content.end());
+    }
+    if (random_() % 16 == 0) result.resize(random_() % (result.size() + 1));
+    result.resize(std::min<std::size_t>(result.size(), 60'000));
+    return result;
   }
-  if (kind < 2) packet.resize(random() % (packet.size() + 1));
-}
+  std::uint64_t random() { return random_(); }
+
+ private:
+  template <class List>
+  auto pick(List& list) -> decltype(list[0]) {
+    return list[random_() % list.size()];
+  }
+
+  static std::vector<Submessage> split(const Bytes& packet) {
+    std::vector<Submessage> parts;
+    for (std::size_t at = kRtpsHeader; at + 4 <= packet.size();) {
+      const bool is_little = packet[at + 1] & 1;
+      std::size_t length = packet[at + (is_little ? 3 : 2)] << 8 | packet[at + (is_little ? 2 : 3)];
+      if (length == 0) length = packet.size() - at - 4;
+      length = std::min(length, packet.size() - at - 4);
+      const auto begin = packet.begin() + static_cast<std::ptrdiff_t>(at) + 4;
+      parts.push_back(
+          {packet[at], packet[at + 1], Bytes(begin, begin + static_cast<std::ptrdiff_t>(length))});
+      at += 4 + length;
+    }
+    return parts;
+  }
+
+  std::uint64_t make_number() {
+    const std::array<std::uint64_t, 12> telling = {
+        0, 1, 2, 4, 0xff, 0x7fff, 0x8000, 0xffff, 0x10000, 0x7fffffff, 0x80000000, 0xffffffff};
+    return random_() % 3 ? pick(telling) : random_() % 512;
+  }
+
+  /// A part of any kind, also of those that a flight does not send.
+  Submessage invent() {
+    Submessage part{static_cast<std::uint8_t>(random_() % 4 ? random_() % 0x35 : 0x80),
+                    static_cast<std::uint8_t>(random_() % 16 | (random_() % 8 != 0)),
+                    Bytes(random_() % 20 * 4)};
+    const auto known = split(pick(packets_));
+    if (!known.empty()) {  // begins with identifiers that exist
+      const Bytes& like = known[random_() % known.size()].content;
+      std::copy_n(like.begin(), std::min(like.size(), part.content.size()), part.content.begin());
+    }
+    return part;
+  }
+
+  void change(std::vector<Submessage>& parts) {
+    Submessage& part = pick(parts);
+    Bytes& content = part.content;
+    switch (random_() % 12) {
+      case 0:
+        part.flags ^= static_cast<std::uint8_t>(1 << random_() % 8);
+        break;
+      case 1:
+        part.kind = invent().kind;
+        break;
+      case 2:
+        content.resize(random_() % (content.size() + 1));
+        break;
+      case 3:
+        for (auto left = random_() % 64; left > 0; --left)
+          content.push_back(static_cast<std::uint8_t>(random_()));
+        break;
+      case 4:
+        std::swap(part, pick(parts));
+        break;
+      case 5:
+        parts.insert(parts.begin() + static_cast<std::ptrdiff_t>(random_() % parts.size()),
+                     random_() % 2 ? invent() : Submessage(part));
+        break;
+      case 6: {  // the rest of another message
+        const auto others = split(pick(packets_));
+        parts.resize(1 + random_() % parts.size());
+        parts.insert(parts.end(), others.begin(), others.end());
+        break;
+      }
+      default: {  // a number of 1, 2, 4 or 8 bytes, mostly in its place
+        const std::size_t bytes = std::size_t{1} << random_() % 4;
+        std::size_t at = random_() % std::min<std::size_t>(content.size() + 1, 64);
+        if (random_() % 4 == 0) at = random_() % (content.size() + 1);
+        at = at / bytes * bytes;
+        const std::uint64_t number = make_number();
+        for (std::size_t i = 0; i < bytes && at + i < content.size(); ++i)
+          content[at + i] = static_cast<std::uint8_t>(number >> 8 * (i % 8));
+      }
+    }
+  }
+
+  const std::vector<Bytes> packets_;
+  std::mt19937_64 random_;
+};
 
 Bytes make_random_bytes(std::mt19937_64& random) {
   Bytes packet(random() % 1400);
@@ -153,14 +271,25 @@ std::uint64_t capture(const Target& target, const std::filesystem::path& file) {
 }
 
 std::uint64_t fire_packets(const Target& target, const std::filesystem::path& captured) {
-  const auto packets = read_captured(captured);
+  Mutator mutator(read_captured(captured), target.seed);
   std::mt19937_64 random(target.seed);
   Gun gun(target);
-  while (goes_on(target)) {
-    Bytes packet = random() % 4 ? packets[random() % packets.size()] : make_random_bytes(random);
-    mutate(packet, 0, random);
-    gun.fire(packet);
+  while (goes_on(target)) gun.fire(random() % 4 ? mutator.make() : make_random_bytes(random));
+  return gun.fired();
+}
+
+std::uint64_t fire_mutations(const Target& target, const std::filesystem::path& captured,
+                             std::uint64_t most) {
+  std::vector<Bytes> packets = read_captured(captured);
+  for (Bytes& packet : packets) {
+    const Bytes sender(packet.begin() + kPrefixAt, packet.begin() + kRtpsHeader);
+    Bytes stranger = sender;
+    for (std::size_t i = 4; i < stranger.size(); ++i) stranger[i] ^= 0x55;
+    replace_all(packet, sender, stranger);
   }
+  Mutator mutator(packets, target.seed);
+  Gun gun(target);
+  while (goes_on(target) && gun.fired() < most) gun.fire(mutator.make());
   return gun.fired();
 }
 
@@ -175,11 +304,7 @@ std::uint64_t announce_forgeries(const Target& target, const std::filesystem::pa
   while (goes_on(target) && gun.fired() < most) {
     Bytes packet = *found, prefix = known;
     for (std::size_t i = 2; i < prefix.size(); ++i) prefix[i] = static_cast<std::uint8_t>(random());
-    for (auto at = packet.begin();;) {
-      at = std::search(at, packet.end(), known.begin(), known.end());
-      if (at == packet.end()) break;
-      at = std::copy(prefix.begin(), prefix.end(), at);
-    }
+    replace_all(packet, known, prefix);
     gun.fire(packet);
   }
   return gun.fired();
@@ -187,13 +312,16 @@ std::uint64_t announce_forgeries(const Target& target, const std::filesystem::pa
 
 std::uint64_t spoof(const Target& target) {
   Sniffer sniffer;
-  std::mt19937_64 random(target.seed);
+  std::vector<Bytes> packets;
+  while (goes_on(target) && packets.size() < kMaxCaptured / 4)
+    if (Bytes packet = sniffer.next(); !packet.empty()) packets.push_back(packet);
+  if (packets.empty()) return 0;
+  Mutator mutator(packets, target.seed);
   Gun gun(target);
   while (goes_on(target)) {
-    Bytes packet = sniffer.next();
-    if (packet.empty() || random() % 8) continue;  // also reads its own packets
-    mutate(packet, kRtpsHeader, random);
-    gun.fire(packet);
+    Bytes packet = sniffer.next();  // its own, too
+    if (packet.empty() || mutator.random() % 8) continue;
+    gun.fire(mutator.make(&packet));
   }
   return gun.fired();
 }

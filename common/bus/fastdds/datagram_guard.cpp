@@ -7,7 +7,8 @@ namespace sls::bus {
 namespace {
 
 // RTPS 2.5, sections 8.3 and 9.4: the header and the submessages.
-constexpr std::size_t kHeader = 20, kSubmessageHeader = 4, kBitmapBits = 256;
+constexpr std::size_t kHeader = 20, kSubmessageHeader = 4, kBitmapBits = 256,
+                      kWriter = 8;  // place in a DATA or a fragment
 enum Submessage : std::uint8_t {
   kPad = 0x01,
   kAckNack = 0x06,
@@ -58,10 +59,11 @@ class Fields {
   bool is_little_;
 };
 
-/// Reads tokens of DDS Security one after the other. Once one does not fit, `is_whole()` is false.
-class Tokens {
+/// Reads texts, tokens of DDS Security and other lists one after the other. Once one does not fit,
+/// `is_whole()` is false.
+class Lists {
  public:
-  explicit Tokens(const Fields& fields, std::size_t place = 0) : fields_(fields), place_(place) {}
+  explicit Lists(const Fields& fields, std::size_t place = 0) : fields_(fields), place_(place) {}
 
   bool is_whole() const { return is_whole_; }
   std::size_t read_count() {
@@ -71,16 +73,22 @@ class Tokens {
     place_ += 4;
     return static_cast<std::size_t>(fields_.read(place_ - 4, 4));
   }
-  void skip_bytes() {
-    const std::size_t bytes = read_count();
-    is_whole_ = is_whole_ && fields_.has(place_, bytes);
-    if (is_whole_) place_ += bytes;
+  /// As many elements as a count says, each of `bytes`.
+  void skip_elements(std::size_t bytes = 1) {
+    const std::size_t all = bytes * read_count();
+    is_whole_ = is_whole_ && fields_.has(place_, all);
+    if (is_whole_) place_ += all;
+  }
+  void skip_text() { skip_elements(); }
+  /// `each` times as many texts as a count says.
+  void skip_texts(std::size_t each = 1) {
+    for (std::size_t left = each * read_count(); is_whole_ && left > 0; --left) skip_text();
   }
   /// The name of a class, pairs of texts, pairs of a text and bytes.
   void skip_token() {
-    skip_bytes();
-    for (int kind = 0; kind < 2; ++kind)
-      for (std::size_t left = 2 * read_count(); is_whole_ && left > 0; --left) skip_bytes();
+    skip_text();
+    skip_texts(2);
+    skip_texts(2);
   }
 
  private:
@@ -116,79 +124,145 @@ const char* judge_heartbeat(const Fields& fields) {
   return nullptr;
 }
 
-/// Announcements of participants, plain and secure, and messages of the handshake. Fast DDS takes
-/// as much memory as a token in them says that it has.
-enum Writer : std::uint32_t {
-  kAnnouncer = 0x0001'00c2,
-  kSecureAnnouncer = 0xff01'01c2,
-  kHandshake = 0x0002'01c3,
-};
-
-bool has_tokens(std::uint32_t writer) {
-  return writer == kAnnouncer || writer == kSecureAnnouncer || writer == kHandshake;
+// Writers of announcements, plain and secure: Fast DDS takes as much memory as a list in them says,
+// and secured readers accept them unprotected.
+bool announces_participants(std::uint32_t writer) {
+  return writer == 0x0001'00c2 || writer == 0xff01'01c2;
+}
+bool announces_endpoints(std::uint32_t writer) {
+  const std::uint32_t number = writer & 0x00ff'ffff;
+  return number == 0x03c2 || number == 0x04c2;
+}
+bool sends_tokens(std::uint32_t writer) {  // handshake, keys
+  return writer == 0x0002'01c3 || writer == 0xff02'02c3;
 }
 
-/// `payload` is a list of parameters: number, length, content.
-bool are_tokens_whole(const Fields& payload) {
-  constexpr std::uint64_t kEnd = 0x0001, kFirstToken = 0x1001, kLastToken = 0x1006,
-                          kEndpointFlags = 0x1004, kParticipantFlags = 0x1005;  // of DDS Security
-  for (std::size_t place = 0; payload.has(place, 4);) {
-    const std::uint64_t number = payload.read(place, 2), length = payload.read(place + 2, 2);
-    if (number == kEnd) return true;
-    place += 4;
-    if (!payload.has(place, length)) return false;
-    if (number >= kFirstToken && number <= kLastToken && number != kEndpointFlags &&
-        number != kParticipantFlags) {
-      Tokens tokens(payload.part(place, length, payload.is_little()));
-      tokens.skip_token();
-      if (!tokens.is_whole()) return false;
-    }
-    place += (length + 3) / 4 * 4;
+constexpr std::uint64_t kListEnd = 0x0001, kParticipantGuid = 0x0050;  // parameters
+
+bool is_parameter_whole(std::uint64_t number, const Fields& content) {
+  constexpr std::size_t kGuid = 16;
+  Lists lists(content);
+  switch (number) {
+    case 0x0005:  // names of topic, type and entity
+    case 0x0007:
+    case 0x0062:
+      lists.skip_text();
+      break;
+    case 0x0029:  // partitions
+      lists.skip_texts();
+      break;
+    case 0x0035:  // filter: names, expression, its parameters
+      for (int text = 0; text < 4; ++text) lists.skip_text();
+      lists.skip_texts();
+      break;
+    case kParticipantGuid:  // its GUID: Fast DDS asserts that there is one
+      for (std::size_t i = 0; i < kGuid && content.has(i, 1); ++i)
+        if (content.read(i, 1) != 0) return content.has(0, kGuid);
+      return false;
+    case 0x0059:  // properties
+      lists.skip_texts(2);
+      break;
+    case 0x0073:  // representations
+      lists.skip_elements(2);
+      break;
+    case 0x8006:  // domains of shared data, of Fast DDS
+      lists.skip_elements(8);
+      break;
+    case 0x1001:  // identity, permissions and their states
+    case 0x1002:
+    case 0x1003:
+    case 0x1006:
+      lists.skip_token();
+      break;
   }
-  return true;
+  return lists.is_whole();
+}
+
+/// Length of the list of parameters at `place`, each a number, a length and content, with what ends
+/// it; 0 if it has no end, one of them is not whole, or there is none of number `wanted`.
+std::size_t measure_parameters(const Fields& fields, std::size_t place = 0,
+                               std::uint64_t wanted = kListEnd) {
+  bool is_there = false;
+  for (std::size_t at = place; fields.has(at, 4);) {
+    const std::uint64_t number = fields.read(at, 2), length = fields.read(at + 2, 2);
+    at += 4;
+    is_there = is_there || number == wanted;
+    if (number == kListEnd) return is_there ? at - place : 0;
+    if (!fields.has(at, length) ||
+        !is_parameter_whole(number, fields.part(at, length, fields.is_little())))
+      return 0;
+    at += (length + 3) / 4 * 4;
+  }
+  return 0;
 }
 
 /// `payload` is a message of the handshake: who writes to whom, its class, tokens.
 bool is_handshake_whole(const Fields& payload) {
   constexpr std::size_t kIdentities = 96;
-  Tokens tokens(payload, kIdentities);
-  tokens.skip_bytes();
-  for (std::size_t left = tokens.read_count(); tokens.is_whole() && left > 0; --left)
-    tokens.skip_token();
-  return tokens.is_whole();
+  Lists lists(payload, kIdentities);
+  lists.skip_text();
+  for (std::size_t left = lists.read_count(); lists.is_whole() && left > 0; --left)
+    lists.skip_token();
+  return lists.is_whole();
+}
+
+/// Where the payload of a DATA or a fragment begins, whose own fields take `least` bytes; 0 if it
+/// is not inside. Fast DDS computes with what the message says of it.
+std::size_t find_payload(const Fields& fields, std::uint8_t flags, std::size_t least) {
+  constexpr std::size_t kToPayload = 2;
+  constexpr std::uint8_t kHasOwnQos = 0x02;
+  if (!fields.has(0, least)) return 0;
+  std::size_t place = kToPayload + 2 + static_cast<std::size_t>(fields.read(kToPayload, 2));
+  if (place < least || place > fields.size()) return 0;
+  if ((flags & kHasOwnQos) == 0) return place;
+  const std::size_t parameters = measure_parameters(fields, place);
+  return parameters > 0 ? place + parameters : 0;
+}
+
+/// A whole sample at `place`.
+const char* judge_sample(const Fields& fields, std::size_t place) {
+  const std::uint32_t writer = fields.read_entity(kWriter);
+  const bool is_little = fields.has(place, 4) && (fields.read_entity(place) & 0x0001'0000) != 0;
+  const Fields payload = fields.part(place + 4, fields.size(), is_little);  // of its representation
+  const bool is_whole =
+      announces_participants(writer) ? measure_parameters(payload, 0, kParticipantGuid) > 0
+      : announces_endpoints(writer)  ? measure_parameters(payload) > 0
+                                     : !sends_tokens(writer) || is_handshake_whole(payload);
+  return is_whole ? nullptr : "a malformed announcement";
 }
 
 const char* judge_data(const Fields& fields, std::uint8_t flags) {
-  constexpr std::size_t kToPayload = 2, kWriter = 8, kNumber = 12, kLeast = 20;
-  constexpr std::uint8_t kHasOwnQos = 0x02, kHasData = 0x04;
-  if (!fields.has(0, kLeast) || !is_number(fields.read_number(kNumber)))
-    return "a DATA without number";
-  const std::uint32_t writer = fields.read_entity(kWriter);
-  if (!has_tokens(writer) || (flags & kHasData) == 0) return nullptr;
-  std::size_t place = kToPayload + 2 + static_cast<std::size_t>(fields.read(kToPayload, 2));
-  if ((flags & kHasOwnQos) != 0) {  // parameters, too, up to the one that ends them
-    while (fields.has(place, 4) && fields.read(place, 2) != 0x0001)
-      place += 4 + static_cast<std::size_t>(fields.read(place + 2, 2));
-    place += 4;
-  }
-  if (!fields.has(place, 4)) return "a DATA that is cut off";
-  const bool is_little = (fields.read_entity(place) & 0x0001'0000) != 0;  // of its representation
-  const Fields payload = fields.part(place + 4, fields.size(), is_little);
-  const bool is_whole =
-      writer == kHandshake ? is_handshake_whole(payload) : are_tokens_whole(payload);
-  return is_whole ? nullptr : "an identity that is longer than its message";
+  constexpr std::size_t kNumber = 12, kLeast = 20;
+  constexpr std::uint8_t kHasData = 0x04, kHasKey = 0x08;
+  const std::size_t place = find_payload(fields, flags, kLeast);
+  if (place == 0 || ((flags & (kHasData | kHasKey)) != 0 && place == fields.size()))
+    return "a DATA that is cut off";
+  if (!is_number(fields.read_number(kNumber))) return "a DATA without number";
+  return (flags & kHasData) != 0 ? judge_sample(fields, place) : nullptr;
 }
 
-const char* judge_fragment(const Fields& fields) {
+const char* judge_fragment(const Fields& fields, std::uint8_t flags) {
   constexpr std::size_t kNumber = 12, kFirst = 20, kCount = 24, kFragment = 26, kSample = 28,
                         kEnd = 32;
-  if (!fields.has(0, kEnd)) return "a fragment that is cut off";
+  constexpr std::uint8_t kHasKey = 0x04;
+  const std::size_t place = find_payload(fields, flags, kEnd);
+  if (place == 0 || (flags & kHasKey) != 0) return "a fragment that is cut off";
   const std::uint64_t first = fields.read(kFirst, 4), count = fields.read(kCount, 2),
                       bytes = fields.read(kFragment, 2), sample = fields.read(kSample, 4);
   if (sample == 0 || sample > kMostSampleBytes) return "a fragment of a sample of impossible size";
-  if (first == 0 || count == 0 || bytes == 0 || (first - 1 + count - 1) * bytes >= sample)
+  // Fast DDS keeps a list in fragments that it has not yet, in words at multiples of 4.
+  if (first == 0 || count == 0 || bytes == 0 || bytes % 4 != 0 ||
+      (first - 1 + count - 1) * bytes >= sample)
     return "a fragment beyond its sample";
-  return is_number(fields.read_number(kNumber)) ? nullptr : "a fragment without number";
+  if (fields.size() - place < std::min(count * bytes, sample - (first - 1) * bytes))
+    return "a fragment that is cut off";
+  if (!is_number(fields.read_number(kNumber))) return "a fragment without number";
+  if (first == 1 && count * bytes >= sample) return judge_sample(fields, place);
+  // Only Cyclone DDS sends fragments of announcements: of the handshake.
+  const std::uint32_t writer = fields.read_entity(kWriter);
+  return announces_participants(writer) || announces_endpoints(writer)
+             ? "an announcement in fragments"
+             : nullptr;
 }
 
 const char* judge_submessage(std::uint8_t kind, std::uint8_t flags, const Fields& fields) {
@@ -198,7 +272,7 @@ const char* judge_submessage(std::uint8_t kind, std::uint8_t flags, const Fields
     case kHeartbeat:
       return judge_heartbeat(fields);
     case kDataFrag:
-      return judge_fragment(fields);
+      return judge_fragment(fields, flags);
     case kData:
       return judge_data(fields, flags);
     case kAckNack:

@@ -14,9 +14,11 @@
 namespace sls::bus {
 
 /// Properties that our participants announce, because discovery does not tell them in each version:
-/// the version of Fast DDS; the process (Refusals::name_process); and of a secured participant, the
-/// subjects of its certificate and of its authority.
+/// the version of Fast DDS; the build, if it has shared memory (host_id.hpp); the process
+/// (Refusals::name_process); and of a secured participant, the subjects of its certificate and of
+/// its authority.
 inline constexpr const char* kVersionProperty = "sls.fastdds";
+inline constexpr const char* kMemoryProperty = "sls.memory";
 inline constexpr const char* kProcessProperty = "sls.process";
 inline constexpr const char* kCertificateProperty = "sls.certificate";
 inline constexpr const char* kAuthorityProperty = "sls.authority";

@@ -111,6 +111,9 @@ TransportDescriptor guard(const TransportDescriptor& transport, std::uint32_t mo
     return std::make_shared<Guarded<Udp, GuardedUdp>>(*udp, most_sent);
   if (const auto* memory = dynamic_cast<const Memory*>(transport.get()))
     return std::make_shared<Guarded<Memory, OwnMemory>>(*memory, 0);
+  // One that hears announcements is on top of another one (plain_announcements.hpp).
+  if (auto* chained = dynamic_cast<rtps::ChainingTransportDescriptor*>(transport.get()))
+    chained->low_level_descriptor = guard(chained->low_level_descriptor, most_sent);
   return transport;
 }
 

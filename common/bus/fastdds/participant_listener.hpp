@@ -1,5 +1,7 @@
 #pragma once
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <atomic>
 #include <iterator>
@@ -8,6 +10,7 @@
 #include <string>
 
 #include "common/bus/fastdds/discovered_participants.hpp"
+#include "common/bus/fastdds/host_id.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
 #include "common/bus/fastdds/plain_announcements.hpp"
 #include "common/bus/fastdds/refusals.hpp"
@@ -28,6 +31,7 @@ class ParticipantListener : public DiscoveryListener {
     /// Its keys are not for other vendors: their readers get nothing (README.md, trap 28), and Fast
     /// DDS 3 does not discover Cyclone DDS (trap 38).
     bool is_for_fastdds_alone = false;
+    bool has_memory = false;  ///< it uses shared memory
   };
 
   explicit ParticipantListener(const Own& own, Neighbours* neighbours = nullptr,
@@ -72,7 +76,9 @@ class ParticipantListener : public DiscoveryListener {
     if (!own_.is_secured && news.identity)
       refusals.note_refused(guid, "it is secured, this is not (--qos config/qos/secure.xml)");
     const auto version = news.properties.find(kVersionProperty);
-    if (version != news.properties.end()) judge_version(guid, version->second);
+    if (version == news.properties.end()) return;
+    judge_version(guid, version->second);
+    name_other_build(news, version->second);
   }
 
   /// Another participant announced itself from `address`, perhaps once more. Only Fast DDS 3 tells
@@ -139,6 +145,19 @@ class ParticipantListener : public DiscoveryListener {
                     kMiddlewareVersion + ": expected one version in a secured flight");
   }
 
+  /// Names a program of ours once that could share memory with this one if their builds were equal.
+  void name_other_build(const ParticipantNews& news, const std::string& version) {
+    constexpr std::size_t kMost = 64;
+    const auto build = news.properties.find(kMemoryProperty);
+    if (!own_.has_memory || build == news.properties.end() ||
+        build->second == std::to_string(middleware_build()) || named_.size() >= kMost ||
+        !named_.insert(news.name).second)
+      return;
+    spdlog::info(
+        "{} uses another build of Fast DDS ({}, here {}): UDP between them, no shared memory",
+        describe_name(news.name), config::to_printable(version, 20), kMiddlewareVersion);
+  }
+
   /// Why it gets no samples of ours although both are authorised; empty if there is no reason.
   std::string find_obstacle(const ParticipantNews& news) const {
     return own_.is_for_fastdds_alone && news.vendor != rtps::c_VendorId_eProsima ? kOtherVendor
@@ -168,6 +187,7 @@ class ParticipantListener : public DiscoveryListener {
   }
 
   const Own own_;
+  std::set<std::string> named_;  // programs of other builds
   PeerId self_;
   std::atomic<bool> is_self_known_{false};
   Neighbours* const neighbours_;

@@ -36,20 +36,28 @@ std::string replace(std::string text, const std::string& old, const std::string&
 
 // Reader and writer; numbers of samples, 4 bytes above and 4 below, little-endian; submessages.
 const std::string kEntities = "000001c7000001c2", kAnnouncer = "00000000000100c2",
-                  kHandshaker = "00000000000201c3";
+                  kHandshaker = "00000000000201c3", kWriters = "00000000000003c2";
 const std::string kOne = "0000000001000000", kFive = "0000000005000000", kSix = "0000000006000000",
                   kDistant = "0100000001000000", kEndless = "ffffff7fffffffff";
 const std::string kHeartbeat = "07011c00" + kEntities, kGap = "08011c00" + kEntities,
-                  kFragment = "1601240000001c00" + kEntities + kOne, kRest = "01000000",
-                  kStatistics = "80013800" + zeros(56);
+                  kFragment = "1601000000001c00" + kEntities + kOne, kRest = "01000000",
+                  kStatistics = "80013800" + zeros(56), kEnd = "01000000",
+                  kSample = "1505000000001000" + kEntities + kOne + "70001000" + zeros(16) + kEnd +
+                            zeros(4);
 // The token "abc" with one property "x": "y" and no bytes, and messages that end with it.
 const std::string kToken = "040000006162630001000000020000007800000002000000790000" + zeros(5),
-                  kIdentity = "1505000000001000" + kAnnouncer + kOne + "0003000001102000" + kToken,
+                  kGuid = "50001000" + zeros(15) + "01",
+                  kIdentity = "1505000000001000" + kAnnouncer + kOne + "00030000" + kGuid +
+                              "01102000" + kToken + kEnd,
                   kHandshake = "1505000000001000" + kHandshaker + kOne + "00010000" + zeros(96) +
                                "020000006100000001000000" + kToken;
 
 TEST(DatagramGuardTest, HarmfulMessagesAreRefused) {
-  const std::string too_long = "an identity that is longer than its message";
+  const std::string malformed = "a malformed announcement", cut_off = "a DATA that is cut off",
+                    cut_fragment = "a fragment that is cut off";
+  const auto announce = [](const std::string& parameter) {
+    return "1505000000001000" + kWriters + kOne + "00030000" + parameter + kEnd;
+  };
   struct Case {
     const char* name;
     std::string submessages, defect;
@@ -66,19 +74,49 @@ TEST(DatagramGuardTest, HarmfulMessagesAreRefused) {
       {"endless", kGap + kOne + kEndless + zeros(4), "a GAP without end"},
       {"of 131,071 samples", kGap + kOne + "0000000000000200" + zeros(4), "a GAP without end"},
       {"of too many bits", kGap + kOne + kSix + "01010000", "a GAP that is cut off"},
-      {"fragment", kFragment + "010000000100000400080000" + zeros(4), ""},
+      {"sample", kSample, ""},
+      {"whose content is too early", replace(kSample, "00001000", "00000f00"), cut_off},
+      {"too late", replace(kSample, "00001000", "0000ff7f"), cut_off},
+      {"of own QoS", replace(kSample, "1505", "1507"), ""},
+      {"without end", replace(replace(kSample, "1505", "1507"), kEnd, "70000000"), cut_off},
+      {"without content", "1505000000001000" + kEntities + kOne, cut_off},
+      {"fragment", kFragment + "010000000100000400080000" + zeros(1024), ""},
+      {"the last one", kFragment + "030000000100000408080000" + zeros(8), ""},
+      {"with less than it says", kFragment + "010000000100000400080000" + zeros(1023),
+       cut_fragment},
+      {"of a key", replace(kFragment, "1601", "1605") + "010000000100000400080000" + zeros(1024),
+       cut_fragment},
+      {"of 6 bytes", kFragment + "010000000100060000080000" + zeros(6),
+       "a fragment beyond its sample"},
       {"of 4 GB", kFragment + "0100000001000004ffffffff" + zeros(4),
        "a fragment of a sample of impossible size"},
       {"beyond its sample", kFragment + "040000000100000400080000" + zeros(4),
        "a fragment beyond its sample"},
       {"of nothing", kFragment + "010000000100000000080000" + zeros(4),
        "a fragment beyond its sample"},
+      {"partition", announce("29000c00010000000200000061000000"), ""},
+      {"of 2^32 - 4 bytes", announce("29000c0001000000fcffffff61000000"), malformed},
+      {"topic", announce("05000800ffffffff61000000"), malformed},
+      {"filter", announce("35001400" + zeros(12) + "ffffffff61000000"), malformed},
+      {"property", announce("59000c0001000000ffffffff61000000"), malformed},
+      {"representations", announce("73000800ffffffff00000000"), malformed},
+      {"shared data", announce("06800c00020000000000000000000000"), malformed},
+      {"in one fragment",
+       replace(kFragment, kEntities, kWriters) +
+           "0100000001001000100000000003000005000800ffffffff00000000",
+       malformed},
+      {"in two",
+       replace(kFragment, kEntities, kWriters) +
+           "0100000001001000180000000003000005000800ffffffff00000000",
+       "an announcement in fragments"},
       {"identity", kIdentity, ""},
-      {"of 4 GB", replace(kIdentity, kToken.substr(0, 8), "ffffffff"), too_long},
-      {"of 2^31 properties", replace(kIdentity, "61626300010000", "616263000000f0"), too_long},
-      {"longer than its announcement", replace(kIdentity, "01102000", "01102400"), too_long},
+      {"of 4 GB", replace(kIdentity, kToken.substr(0, 8), "ffffffff"), malformed},
+      {"of nobody", replace(kIdentity, kGuid, "50001000" + zeros(16)), malformed},
+      {"without participant", replace(kIdentity, kGuid, ""), malformed},
+      {"of 2^31 properties", replace(kIdentity, "61626300010000", "616263000000f0"), malformed},
+      {"longer than its announcement", replace(kIdentity, "01102000", "01102400"), malformed},
       {"handshake", kHandshake, ""},
-      {"of 2^31 tokens", replace(kHandshake, "6100000001000000", "61000000000000f0"), too_long},
+      {"of 2^31 tokens", replace(kHandshake, "6100000001000000", "61000000000000f0"), malformed},
       {"statistics in the middle", kStatistics + "01010000",
        "statistics in the middle of a message"},
       {"longer than the message", "15010001" + zeros(8), "a submessage that is cut off"},

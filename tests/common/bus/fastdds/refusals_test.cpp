@@ -132,6 +132,26 @@ TEST_F(RefusalsTest, ASecuredFlightNeedsOneVersion) {
     }
 }
 
+TEST_F(RefusalsTest, AProgramWithAnotherBuildIsNamedOnceIfBothHaveSharedMemory) {
+  for (const bool has_memory : {false, true}) {
+    said_.str("");
+    ParticipantListener::Own own;
+    own.has_memory = has_memory;
+    ParticipantListener listener(own);
+    ParticipantNews news;
+    for (const int build : {0, int{middleware_build()}, 0}) {
+      news.name = build == 0 ? "recorder" : "sim_server";
+      news.properties = {{kVersionProperty, "3.1.2"}, {kMemoryProperty, std::to_string(build)}};
+      ++news.guid.guidPrefix.value[0];
+      listener.on_participant(nullptr, news);
+    }
+    EXPECT_EQ(said_.str(), has_memory ? "'recorder' uses another build of Fast DDS (3.1.2, here " +
+                                            std::string(kMiddlewareVersion) +
+                                            "): UDP between them, no shared memory\n"
+                                      : "");
+  }
+}
+
 TEST_F(RefusalsTest, OnlyKeysForOtherVendorsLetAnotherVendorsParticipantBeDiscovered) {
   for (const bool is_for_fastdds_alone : {false, true}) {
     ParticipantListener listener({true, is_for_fastdds_alone});
