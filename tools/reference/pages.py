@@ -178,39 +178,20 @@ def find_row(page, command):
 
 
 def make_topics_page(_):
-    structs, enums, comments = sources.load_contract()
     profiles, endpoints = sources.load_profiles(), sources.load_endpoints()
-    text = "# Topics and messages\n\n" + NOTE + """
-Topics, their types and their QoS, from `common/bus/topics.hpp`, `idl/sls.idl` and `config/qos/endpoints.xml`.
-[idl](../../idl/README.md) says which program writes and reads each topic, and how another program takes part.
-
-## Topics
+    text = "# Topics\n\n" + NOTE + """
+Topics and their QoS, from `common/bus/topics.hpp` and `config/qos/endpoints.xml`. [sls.idl](../../idl/sls.idl) has the
+fields of each type. [idl](../../idl/README.md) says which program writes and reads each topic, and how another program
+takes part.
 
 """
-    rows = []
-    for name, message, flow in sources.load_topics():
-        rows.append([f"`{name}`", f"[{message}](#{message.lower()})", f"`{profiles[flow + 'Writer']}`",
-                     f"`{profiles[flow + 'Reader']}`"])
-    text += make_table(["topic", "type", "writer's profile", "reader's profile"], rows)
-    text += "\n"
-    text += ("In real time `sls/command` has the profiles "
-             f"`{profiles['RealtimeCommandWriter']}` and `{profiles['RealtimeCommandReader']}`.\n\n## QoS profiles\n\n")
-    text += make_table(["profile", "reliability", "durability", "history", "deadline", "lifespan"],
-                       [[f"`{profile}`", *qos.values()] for profile, qos in endpoints.items()])
-    text += "\n## Types\n"
-    for name, fields in structs.items():
-        text += f"\n### {name}\n\n" + (comments[name] + "\n\n" if comments[name] else "")
-        text += make_table(["field", "type", "meaning"],
-                           [[f"`{field}`", f"`{kind}`", comment] for kind, field, comment in fields])
-    text += "\n## Enumerations\n"
-    for name, values in enums.items():
-        text += f"\n### {name}\n\n" + (comments[name] + "\n\n" if comments[name] else "")
-        if any(comment for _, comment in values):
-            text += make_table(["number", "value", "meaning"],
-                               [[str(number), f"`{value}`", comment] for number, (value, comment) in enumerate(values)])
-        else:
-            text += ", ".join(f"{number} `{value}`" for number, (value, _) in enumerate(values)) + "\n"
-    return text
+    text += make_table(["topic", "type", "writer's profile", "reader's profile"], [
+        [f"`{name}`", f"`{message}`", f"`{profiles[flow + 'Writer']}`", f"`{profiles[flow + 'Reader']}`"]
+        for name, message, flow in sources.load_topics()])
+    text += "\n" + ("In real time `sls/command` has the profiles "
+             f"`{profiles['RealtimeCommandWriter']}` and `{profiles['RealtimeCommandReader']}`.\n\n")
+    return text + make_table(["profile", "reliability", "durability", "history", "deadline", "lifespan"],
+                             [[f"`{profile}`", *qos.values()] for profile, qos in endpoints.items()])
 
 
 def make_error_codes_page(_):
@@ -232,8 +213,7 @@ failed. Logs and recordings show the name.
     text += """
 ## Counters of a run
 
-The server counts the events of [SyncCounters](topics.md#synccounters) in `counters` of `sls/status`; `status.csv` has a
-column for each.
+The server counts the events of `SyncCounters` in [sls.idl](../../idl/sls.idl); `status.csv` has a column for each.
 
 `stale` counts answers that reached the server. Fast DDS drops an expired answer earlier and without a count: then only
 `late` and `held` grow, as without a client. Its cause is the network, or a clock that is behind the server's.

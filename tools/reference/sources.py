@@ -189,33 +189,12 @@ def load_endpoints():
     return endpoints
 
 
-def load_contract():
-    """The structs and enumerations of idl/sls.idl: ({name: [(type, name, comment)]}, {name: [(value, comment)]},
-    {name: comment before it})."""
-    structs, enums, comments = {}, {}, {}
-    for before, kind, name, body in re.findall(r"((?:^ *//.*\n)*)(?:^ *@final\n)?^ *(struct|enum) (\w+) *\{([^}]*)\}",
-                                               read("idl/sls.idl"), re.MULTILINE):
-        comments[name] = " ".join(line.strip().removeprefix("//").strip() for line in before.splitlines())
-        entries = []  # each with its comment, which may go on in the lines after it
-        for line in body.splitlines():
-            code, _, comment = map(str.strip, line.partition("//"))
-            if kind == "enum":
-                entries += [(value, "") for value in re.findall(r"[A-Z]\w+", code)]
-            elif match := re.match(r"(.+?)\s+(\w+)(\[\d+\])?;$", code):
-                entries.append((match[1] + (match[3] or ""), match[2], ""))
-            if comment and entries:
-                entries[-1] = (*entries[-1][:-1], f"{entries[-1][-1]} {comment}".strip())
-        (enums if kind == "enum" else structs)[name] = entries
-    return structs, enums, comments
-
-
 def load_faults():
     """The error codes of a controller: [(number, name in files, name in the contract, meaning)]."""
-    enums = load_contract()[1]
     header = re.search(r"enum class ErrorCode[^{]*\{(.*?)\};", read("common/model/answer.hpp"), re.DOTALL)[1]
     meanings = re.findall(r"(k\w+),(?:\s*///< (.*))?", header)
     texts = dict(re.findall(r'case ErrorCode::(k\w+):\s*return "(\w+)";', read("common/model/answer.hpp")))
-    wire = [value for value, _ in enums["FaultCode"]]
+    wire = re.findall(r"FAULT_\w+", read("idl/sls.idl"))
     if len(wire) != len(meanings):
         raise StaleReference("idl/sls.idl and common/model/answer.hpp have different numbers of error codes")
     return [(number, texts[name], wire[number], meaning) for number, (name, meaning) in enumerate(meanings)]
