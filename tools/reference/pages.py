@@ -129,10 +129,9 @@ def describe_help(name, parsed, level):
 def make_commands_page(build):
     text = "# Commands and options\n\n" + NOTE + """
 First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints. Every command has
-`--help`, every program `--help` and `--version`. [Exit codes](error-codes.md) are the same for all programs.
+`--help`, every program `--help` and `--version`. All have these exit codes:
 
-## ./sls
-"""
+""" + make_table(["code", "meaning"], sources.load_exit_codes()) + "\n## ./sls\n"
     launcher = sources.read_launcher(build)
     programs = sources.load_programs(build)
     helps = {sources.read_help(build, name).rstrip(): name for name in programs}
@@ -194,40 +193,9 @@ takes part.
                              [[f"`{profile}`", *qos.values()] for profile, qos in endpoints.items()])
 
 
-def make_error_codes_page(_):
-    text = "# Error codes\n\n" + NOTE + """
-## Exit codes of every program and of ./sls
-
-"""
-    text += make_table(["code", "meaning"], [list(row) for row in sources.load_exit_codes()])
-    text += """
-## Error codes of a controller
-
-A controller that cannot answer sends one of these in `fault` of its command. The force is then zero and the mission has
-failed. Logs and recordings show the name.
-
-"""
-    text += make_table(["number", "name", "in the contract", "meaning"],
-                       [[str(number), f"`{name}`", f"`{wire}`", meaning]
-                        for number, name, wire, meaning in sources.load_faults()])
-    text += """
-## Counters of a run
-
-The server counts the events of `SyncCounters` in [sls.idl](../../idl/sls.idl); `status.csv` has a column for each.
-
-`stale` counts answers that reached the server. Fast DDS drops an expired answer earlier and without a count: then only
-`late` and `held` grow, as without a client. Its cause is the network, or a clock that is behind the server's.
-
-`rejected_not_finite` counts NaN and infinity in the force, the controller's numbers or the reference. A client that
-cannot compute an answer sends the error code `not_finite` instead.
-"""
-    return text
-
-
 PAGES = {
     "scenario.md": make_scenario_page,
     "recordings.md": make_recordings_page,
     "commands.md": make_commands_page,
     "topics.md": make_topics_page,
-    "error-codes.md": make_error_codes_page,
 }

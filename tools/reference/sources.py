@@ -141,7 +141,7 @@ def load_keys(build):
     return rows
 
 
-# --- topics and codes -----------------------------------------------------------------------------
+# --- topics, exit codes ----------------------------------------------------------------------------
 
 
 def load_topics():
@@ -187,17 +187,6 @@ def load_endpoints():
             "lifespan": seconds(node, "qos/lifespan/duration"),
         }
     return endpoints
-
-
-def load_faults():
-    """The error codes of a controller: [(number, name in files, name in the contract, meaning)]."""
-    header = re.search(r"enum class ErrorCode[^{]*\{(.*?)\};", read("common/model/answer.hpp"), re.DOTALL)[1]
-    meanings = re.findall(r"(k\w+),(?:\s*///< (.*))?", header)
-    texts = dict(re.findall(r'case ErrorCode::(k\w+):\s*return "(\w+)";', read("common/model/answer.hpp")))
-    wire = re.findall(r"FAULT_\w+", read("idl/sls.idl"))
-    if len(wire) != len(meanings):
-        raise StaleReference("idl/sls.idl and common/model/answer.hpp have different numbers of error codes")
-    return [(number, texts[name], wire[number], meaning) for number, (name, meaning) in enumerate(meanings)]
 
 
 def load_exit_codes():
