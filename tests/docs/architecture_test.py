@@ -38,6 +38,14 @@ def read_code():
 
 
 class ArchitectureTest(unittest.TestCase):
+    def test_the_readme_of_the_contract_has_each_topic_with_its_type_and_profiles(self):
+        code = read("common/bus/topics.hpp")
+        topics = dict(zip(re.findall(r'"(sls/\w+)"', code), re.findall(r"struct Topic<(\w+)> .*Flow::k(\w+)>", code)))
+        self.assertEqual(len(topics), len(re.findall(r"struct Topic<\w+> :", code)))
+        for topic, (message, flow) in topics.items():
+            profiles = f"`sls_{flow.lower()}_writer` → `sls_{flow.lower()}_reader`"
+            self.assertRegex(read("idl/README.md"), rf"(?m)^\| `{topic}` \| `{message}` \|.* {profiles}")
+
     maxDiff = None
     make = load_make()
 

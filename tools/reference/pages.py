@@ -176,26 +176,8 @@ def find_row(page, command):
     return match[1] if match else ""
 
 
-def make_topics_page(_):
-    profiles, endpoints = sources.load_profiles(), sources.load_endpoints()
-    text = "# Topics\n\n" + NOTE + """
-Topics and their QoS, from `common/bus/topics.hpp` and `config/qos/endpoints.xml`. [sls.idl](../../idl/sls.idl) has the
-fields of each type. [idl](../../idl/README.md) says which program writes and reads each topic, and how another program
-takes part.
-
-"""
-    text += make_table(["topic", "type", "writer's profile", "reader's profile"], [
-        [f"`{name}`", f"`{message}`", f"`{profiles[flow + 'Writer']}`", f"`{profiles[flow + 'Reader']}`"]
-        for name, message, flow in sources.load_topics()])
-    text += "\n" + ("In real time `sls/command` has the profiles "
-             f"`{profiles['RealtimeCommandWriter']}` and `{profiles['RealtimeCommandReader']}`.\n\n")
-    return text + make_table(["profile", "reliability", "durability", "history", "deadline", "lifespan"],
-                             [[f"`{profile}`", *qos.values()] for profile, qos in endpoints.items()])
-
-
 PAGES = {
     "scenario.md": make_scenario_page,
     "recordings.md": make_recordings_page,
     "commands.md": make_commands_page,
-    "topics.md": make_topics_page,
 }
