@@ -70,17 +70,6 @@ void begin_sync(const std::filesystem::path& path) {
   ::close(descriptor);
 }
 
-/// Synchronises a file or folder, because the files that a manifest lists must survive a power cut.
-void sync_to_disk(const std::filesystem::path& path) {
-  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  // EINVAL: the file system does not support it for this file or folder.
-  const bool is_done = descriptor >= 0 && (::fsync(descriptor) == 0 || errno == EINVAL);
-  const int error = errno;
-  if (descriptor >= 0) ::close(descriptor);
-  if (!is_done)
-    throw std::system_error(error, std::generic_category(), path.string() + ": cannot write");
-}
-
 /// The verification of a recording must open files of its folder only, so a manifest cannot name
 /// others.
 bool is_in_folder(const std::filesystem::path& name) {
@@ -159,6 +148,16 @@ ManifestFile to_manifest(const Json& json) {
 }
 
 }  // namespace
+
+void sync_to_disk(const std::filesystem::path& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  // EINVAL: the file system does not support it for this file or folder.
+  const bool is_done = descriptor >= 0 && (::fsync(descriptor) == 0 || errno == EINVAL);
+  const int error = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!is_done)
+    throw std::system_error(error, std::generic_category(), path.string() + ": cannot write");
+}
 
 void write_manifest(const std::filesystem::path& folder, const Manifest& manifest) {
   const Parameters& parameters = manifest.parameters;

@@ -38,6 +38,10 @@ struct Manifest : Claims {
   std::map<std::string, std::string> format_versions;  ///< of libraries of the sinks: "zstd"
 };
 
+/// Synchronises a file or folder, which must survive a power cut. @throws std::system_error naming
+/// it.
+void sync_to_disk(const std::filesystem::path& path);
+
 /// Writes `folder`/manifest.json and replaces an earlier one atomically: a reader finds the old or
 /// the new one, never a part of it. The files that it lists are on the disk before it.
 /// @throws std::system_error naming the file.

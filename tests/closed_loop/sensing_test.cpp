@@ -35,17 +35,6 @@ config::Scenario make_awkward(config::Scenario scenario) {
   return scenario;
 }
 
-void expect_equal_bits(const model::Measurement& a, const model::Measurement& b) {
-  ASSERT_EQ(a.p_WQ, b.p_WQ);
-  ASSERT_EQ(a.v_WQ, b.v_WQ);
-  ASSERT_EQ(a.p_WL, b.p_WL);
-  ASSERT_EQ(a.v_WL, b.v_WL);
-  ASSERT_EQ(a.rod.alpha, b.rod.alpha);
-  ASSERT_EQ(a.rod.beta, b.rod.beta);
-  ASSERT_EQ(a.rod.alpha_dot, b.rod.alpha_dot);
-  ASSERT_EQ(a.rod.beta_dot, b.rod.beta_dot);
-}
-
 void expect_equal_flights(const std::vector<model::StepRecord>& a,
                           const std::vector<model::StepRecord>& b) {
   ASSERT_EQ(a.size(), b.size());

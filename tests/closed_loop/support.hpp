@@ -1,6 +1,8 @@
 /// Shared by the tests of the closed loop in one process.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <string>
 
 #include "common/config/scenario.hpp"
@@ -26,6 +28,17 @@ inline config::Scenario delay_command(config::Scenario scenario, std::int64_t pe
                                        config::DelayFault{periods * scenario.sync.period_ns}));
   scenario.faults.back().vehicle = vehicle;
   return scenario;
+}
+
+inline void expect_equal_bits(const model::SlungLoadState& a, const model::SlungLoadState& b) {
+  ASSERT_EQ(a.p_WQ, b.p_WQ);
+  ASSERT_EQ(a.v_WQ, b.v_WQ);
+  ASSERT_EQ(a.p_WL, b.p_WL);
+  ASSERT_EQ(a.v_WL, b.v_WL);
+  ASSERT_EQ(a.rod.alpha, b.rod.alpha);
+  ASSERT_EQ(a.rod.beta, b.rod.beta);
+  ASSERT_EQ(a.rod.alpha_dot, b.rod.alpha_dot);
+  ASSERT_EQ(a.rod.beta_dot, b.rod.beta_dot);
 }
 
 /// Three vehicles that hold a triangle 0.1 m beside its start for 4 s, law `cooperative`.

@@ -41,6 +41,14 @@ class ArchitectureTest(unittest.TestCase):
     maxDiff = None
     make = load_make()
 
+    def test_the_readme_of_the_contract_has_each_topic_with_its_type_and_profiles(self):
+        code = read("common/bus/topics.hpp")
+        topics = dict(zip(re.findall(r'"(sls/\w+)"', code), re.findall(r"struct Topic<(\w+)> .*Flow::k(\w+)>", code)))
+        self.assertEqual(len(topics), len(re.findall(r"struct Topic<\w+> :", code)))
+        for topic, (message, flow) in topics.items():
+            profiles = f"`sls_{flow.lower()}_writer` → `sls_{flow.lower()}_reader`"
+            self.assertRegex(read("idl/README.md"), rf"(?m)^\| `{topic}` \| `{message}` \|.* {profiles}")
+
     def test_every_diagram_is_drawn_from_the_source_beside_it(self):
         sources = self.make.list_sources()
         self.assertGreater(len(sources), 4)

@@ -8,7 +8,7 @@ Comments in the document, which are not visible in a browser, mark its blocks:
     <!-- file: mine/hop.yaml -->           the block below is written to this file
     <!-- terminal: 2 -->                   its commands run in terminal 2 (default: 1)
     <!-- host: recorder -->                on its own host, a network namespace: only with root
-    <!-- needs: hosts -->                  runs only with these hosts; `docker`: only with an engine and image
+    <!-- needs: hosts -->                  runs only with these hosts
     <!-- exit: 2 -->                       its last command ends with exit code 2 (default: 0)
     <!-- any order -->                     its lines come in any order, because several programs print them
     <!-- waits -->                         the next block waits for the end of its commands, as in terminal 1
@@ -31,7 +31,6 @@ import os
 import pathlib
 import re
 import secrets
-import shutil
 import signal
 import socket
 import subprocess
@@ -43,7 +42,7 @@ import urllib.request
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests/support"), str(ROOT / "python")]
-from own_domain import OwnDomain  # noqa: E402
+from own_domain import own_domain  # noqa: E402
 from sls.check.hosts import Hosts  # noqa: E402
 from sls.errors import RunError  # noqa: E402
 from sls.input_error import InputError  # noqa: E402
@@ -307,15 +306,6 @@ def made_hosts():
         yield hosts
 
 
-def find_docker_obstacle():
-    image = os.environ.get("SLS_IMAGE")
-    if not image:
-        return "SLS_IMAGE names no image"
-    command = ["docker", "image", "inspect", image]
-    has_image = shutil.which("docker") and subprocess.run(command, capture_output=True).returncode == 0
-    return None if has_image else f"no Docker engine with the image {image}"
-
-
 def find_free_port():
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -362,13 +352,12 @@ class Reader:
                 (folder / entry.name).symlink_to(entry)
         (folder / "build").symlink_to(build)
         (folder / "home").mkdir()
-        self.environment = {**os.environ, "SLS_BUILD": str(build), "SLS_DOMAIN": domain, "MPLCONFIGDIR":
+        self.environment = {**os.environ, "SLS_BUILD": str(build), "SLS_DOMAIN": str(domain), "MPLCONFIGDIR":
                             str(folder / "home"), "LC_ALL": "C.UTF-8"}
 
     def find_obstacle(self, block):
-        if "host" in block.marks or block.marks.get("needs") == "hosts":
-            return self.hosts if isinstance(self.hosts, str) else None
-        return find_docker_obstacle() if block.marks.get("needs") == "docker" else None
+        needs_hosts = "host" in block.marks or block.marks.get("needs") == "hosts"
+        return self.hosts if needs_hosts and isinstance(self.hosts, str) else None
 
     def find_terminal(self, block):
         host = block.marks.get("host")
@@ -466,7 +455,7 @@ def main():
     test_the_comparison_itself()
     try:
         steps = read_document(DOCUMENT.read_text())
-        with OwnDomain() as domain, made_hosts() as hosts, tempfile.TemporaryDirectory() as folder:
+        with own_domain() as domain, made_hosts() as hosts, tempfile.TemporaryDirectory() as folder:
             reader = Reader(pathlib.Path(folder), build, domain, hosts, "--verbose" in sys.argv)
             reader.read(steps)
             print(f"{reader.ran} commands in {time.monotonic() - reader.began:.0f} s")

@@ -14,7 +14,7 @@ import yaml
 ROOT = Path(__file__).resolve().parents[2]
 BUILD = Path(os.environ.get("SLS_BUILD", ROOT / "build"))
 sys.path.append(str(ROOT / "tests/support"))
-from own_domain import OwnDomain  # noqa: E402
+from own_domain import own_domain  # noqa: E402
 
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory):
@@ -80,7 +80,7 @@ def test_the_services_of_the_compose_file_fly_what_the_check_expects(run, folder
     assert image == [("scenario.yaml", "/flight/"), ("build/my_law.so", "/flight/build/")]
     run(folder, read_steps(folder)["Build"]["run"])
     processes = []
-    with OwnDomain() as domain:
+    with own_domain() as domain:
         for name, service in services.items():
             assert service["image"] == ("${MY_IMAGE:-my-controller}" if "build" in service else "${SLS_IMAGE:-sls}")
             words = service["command"]

@@ -19,7 +19,7 @@ import time
 import unittest
 
 import checkout
-from own_domain import OwnDomain
+from own_domain import own_domain
 from places import ROOT, launch
 from sls import __version__
 from sls.launcher import completion, flights, listing
@@ -185,7 +185,7 @@ class AnswersTest(unittest.TestCase):
         self.assertEqual(summary["certificate"], manifest["certificate"])
 
     def test_a_flight_in_real_time_shows_its_progress_on_a_terminal(self):
-        with tempfile.TemporaryDirectory() as folder, OwnDomain() as domain:
+        with tempfile.TemporaryDirectory() as folder, own_domain() as domain:
             ours, theirs = pty.openpty()
             process = subprocess.Popen(
                 [ROOT / "sls", "run", "short", "--mode", "realtime", "--rtf", "0.3", "--domain", str(domain),

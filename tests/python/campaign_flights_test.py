@@ -11,7 +11,7 @@ import unittest.mock
 import sls
 import yaml
 from campaign_engine_support import CampaignTest
-from own_domain import OwnDomain
+from own_domain import own_domain
 from places import BUILD
 
 BASE = sls.load_scenario("short", changes={
@@ -206,7 +206,7 @@ class FlightsTest(CampaignTest):
 
     def test_runs_flown_over_dds_have_the_same_certificates(self):
         self.write_campaign("certify: { some: 3, seed: 1 }\n")  # other runs get a certificate in the verification
-        with OwnDomain() as domain:
+        with own_domain() as domain:
             said = self.fly("campaign.yaml", "--out", "out", "--verify", 4, "--domain", domain)
             self.assertIn("verify: 4 of 4 runs have the same certificate when flown over DDS", said)
             verified = json.loads((self.folder / "out/manifest.json").read_text())["verified"]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import sls
 from client_program import LAWS
-from own_domain import OwnDomain
+from own_domain import own_domain
 from places import BUILD, ROOT
 from processes import Processes, wait_until
 
@@ -20,8 +20,8 @@ DEADLINE_S = 60
 
 @pytest.fixture
 def domain():
-    with OwnDomain() as number:
-        yield int(number)
+    with own_domain() as number:
+        yield number
 
 
 class Flight(Processes):

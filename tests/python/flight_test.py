@@ -6,7 +6,7 @@ import textwrap
 import numpy as np
 import sls
 import support
-from own_domain import OwnDomain
+from own_domain import own_domain
 from places import ROOT, launch
 from sls.figures import make_figures
 from sls.metrics import calc_stage_metrics
@@ -22,7 +22,7 @@ class FlightTest(support.FolderTest):
         return done.stdout + done.stderr
 
     def test_the_short_flight_is_plotted_and_reported(self):
-        domain = self.enterContext(OwnDomain())
+        domain = self.enterContext(own_domain())
         self.run_launcher("run", "short", "--out", "r", "--domain", domain)
         self.assertIn("figures: r/figures", self.run_launcher("plot", "r", "--panels", "path", "errors"))
         self.assertIn("report: r/report.html", self.run_launcher("report", "r"))
@@ -67,7 +67,7 @@ class FlightTest(support.FolderTest):
         self.assertLessEqual({"body_attitude", "body_rates", "rotors", "thrust"}, make_figures([flight]).keys())
 
     def test_documents_show_what_the_demo_prints_beside_the_published_figures(self):
-        domain = self.enterContext(OwnDomain())
+        domain = self.enterContext(own_domain())
         printed = self.run_launcher("demo", "figure_eight", "--out", "r", "--domain", domain)
         table = re.search(r"Load position error on the second lap.*?\n\n", printed, re.DOTALL)[0]
         readme = (ROOT / "README.md").read_text()

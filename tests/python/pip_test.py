@@ -5,7 +5,7 @@ import os
 import subprocess
 
 import pytest
-from own_domain import OwnDomain
+from own_domain import own_domain
 from places import ROOT
 
 
@@ -46,8 +46,8 @@ def test_a_flight_by_name_is_that_of_the_checkout(python):
 def test_the_command_flies_over_dds_and_lists_what_there_is(python, tmp_path):
     command = python.parent / "sls"
     assert "figure_eight" in start(command, "list").stdout
-    with OwnDomain() as domain:
-        done = start(command, "run", "short", "--out", tmp_path / "flight", "--domain", domain, "--json", cwd=tmp_path)
+    with own_domain() as domain:
+        done = start(command, "run", "short", "--out", tmp_path / "flight", "--domain", str(domain), "--json", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     import sls
     assert json.loads(done.stdout)["certificate"] == sls.fly("short").certificate

@@ -1,9 +1,5 @@
 #include "tools/convert/conversion.hpp"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <cerrno>
 #include <cmath>
 #include <limits>
 #include <set>
@@ -67,15 +63,6 @@ void check_output(const fs::path& out, bool force) {
     throw ConfigError(place + ": expected a place for a new file, got one that exists (--force)");
 }
 
-void sync_to_disk(const fs::path& file) {
-  const int descriptor = ::open(file.c_str(), O_RDONLY | O_CLOEXEC);
-  const bool is_done = descriptor >= 0 && (::fsync(descriptor) == 0 || errno == EINVAL);
-  const int error = errno;
-  if (descriptor >= 0) ::close(descriptor);
-  if (!is_done)
-    throw std::system_error(error, std::generic_category(), file.string() + ": cannot write");
-}
-
 /// Adds the measured row of the step to `rows`.
 void add_measured(record::RowReader<record::MeasuredRow>& measured, StepRows& rows) {
   StepRows left_out;  // of steps without a state
@@ -112,7 +99,7 @@ std::uint64_t write_mcap(const record::OpenedRecording& flight, const fs::path& 
   fs::remove(part, ignored);  // left by a conversion that was killed
   try {
     const std::uint64_t messages = write(flight, part);
-    sync_to_disk(part);
+    record::sync_to_disk(part);
     fs::rename(part, out);
     return messages;
   } catch (...) {

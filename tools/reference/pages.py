@@ -129,10 +129,9 @@ def describe_help(name, parsed, level):
 def make_commands_page(build):
     text = "# Commands and options\n\n" + NOTE + """
 First the commands of `./sls`, then the programs that they start. Each text is what `--help` prints. Every command has
-`--help`, every program `--help` and `--version`. [Exit codes](error-codes.md) are the same for all programs.
+`--help`, every program `--help` and `--version`. All have these exit codes:
 
-## ./sls
-"""
+""" + make_table(["code", "meaning"], sources.load_exit_codes()) + "\n## ./sls\n"
     launcher = sources.read_launcher(build)
     programs = sources.load_programs(build)
     helps = {sources.read_help(build, name).rstrip(): name for name in programs}
@@ -177,77 +176,8 @@ def find_row(page, command):
     return match[1] if match else ""
 
 
-def make_topics_page(_):
-    structs, enums, comments = sources.load_contract()
-    profiles, endpoints = sources.load_profiles(), sources.load_endpoints()
-    text = "# Topics and messages\n\n" + NOTE + """
-Topics, their types and their QoS, from `common/bus/topics.hpp`, `idl/sls.idl` and `config/qos/endpoints.xml`.
-[idl](../../idl/README.md) says which program writes and reads each topic, and how another program takes part.
-
-## Topics
-
-"""
-    rows = []
-    for name, message, flow in sources.load_topics():
-        rows.append([f"`{name}`", f"[{message}](#{message.lower()})", f"`{profiles[flow + 'Writer']}`",
-                     f"`{profiles[flow + 'Reader']}`"])
-    text += make_table(["topic", "type", "writer's profile", "reader's profile"], rows)
-    text += "\n"
-    text += ("In real time `sls/command` has the profiles "
-             f"`{profiles['RealtimeCommandWriter']}` and `{profiles['RealtimeCommandReader']}`.\n\n## QoS profiles\n\n")
-    text += make_table(["profile", "reliability", "durability", "history", "deadline", "lifespan"],
-                       [[f"`{profile}`", *qos.values()] for profile, qos in endpoints.items()])
-    text += "\n## Types\n"
-    for name, fields in structs.items():
-        text += f"\n### {name}\n\n" + (comments[name] + "\n\n" if comments[name] else "")
-        text += make_table(["field", "type", "meaning"],
-                           [[f"`{field}`", f"`{kind}`", comment] for kind, field, comment in fields])
-    text += "\n## Enumerations\n"
-    for name, values in enums.items():
-        text += f"\n### {name}\n\n" + (comments[name] + "\n\n" if comments[name] else "")
-        if any(comment for _, comment in values):
-            text += make_table(["number", "value", "meaning"],
-                               [[str(number), f"`{value}`", comment] for number, (value, comment) in enumerate(values)])
-        else:
-            text += ", ".join(f"{number} `{value}`" for number, (value, _) in enumerate(values)) + "\n"
-    return text
-
-
-def make_error_codes_page(_):
-    text = "# Error codes\n\n" + NOTE + """
-## Exit codes of every program and of ./sls
-
-"""
-    text += make_table(["code", "meaning"], [list(row) for row in sources.load_exit_codes()])
-    text += """
-## Error codes of a controller
-
-A controller that cannot answer sends one of these in `fault` of its command. The force is then zero and the mission has
-failed. Logs and recordings show the name.
-
-"""
-    text += make_table(["number", "name", "in the contract", "meaning"],
-                       [[str(number), f"`{name}`", f"`{wire}`", meaning]
-                        for number, name, wire, meaning in sources.load_faults()])
-    text += """
-## Counters of a run
-
-The server counts the events of [SyncCounters](topics.md#synccounters) in `counters` of `sls/status`; `status.csv` has a
-column for each.
-
-`stale` counts answers that reached the server. Fast DDS drops an expired answer earlier and without a count: then only
-`late` and `held` grow, as without a client. Its cause is the network, or a clock that is behind the server's.
-
-`rejected_not_finite` counts NaN and infinity in the force, the controller's numbers or the reference. A client that
-cannot compute an answer sends the error code `not_finite` instead.
-"""
-    return text
-
-
 PAGES = {
     "scenario.md": make_scenario_page,
     "recordings.md": make_recordings_page,
     "commands.md": make_commands_page,
-    "topics.md": make_topics_page,
-    "error-codes.md": make_error_codes_page,
 }

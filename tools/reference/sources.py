@@ -6,7 +6,6 @@ import pathlib
 import re
 import subprocess
 import sys
-import xml.etree.ElementTree as xml
 
 import help_text
 
@@ -63,6 +62,13 @@ def load_programs(build):
 
 def read_version(build):
     return run([build / "bin/sim_server", "--version"]).strip()
+
+
+def load_exit_codes():
+    """[(code, meaning)] of every program."""
+    header = read("common/app/run_main.hpp")
+    codes = re.findall(r"kExit\w+ = (\d+);\s*///< (.*)", header)
+    return codes + [(code, f"Interrupted by {name}.") for code, name in re.findall(r"(\d+) \((SIG\w+)\)", header)]
 
 
 # --- the launcher ---------------------------------------------------------------------------------
@@ -139,90 +145,3 @@ def load_keys(build):
     if unused:
         raise StaleReference(f"docs/reference/scenario.md: no key for the row of '{min(unused)}'")
     return rows
-
-
-# --- topics and codes -----------------------------------------------------------------------------
-
-
-def load_topics():
-    """[(name, type, flow)], as common/bus/topics.hpp has them."""
-    text = read("common/bus/topics.hpp")
-    names = re.findall(r'"(sls/\w+)"', text)
-    found = re.findall(r"struct Topic<(\w+)> : TopicOf<TopicId::k\w+, Flow::k(\w+)>", text)
-    if not found or len(found) != len(names):
-        raise SystemExit("common/bus/topics.hpp: expected topics and as many names, got "
-                         f"{len(found)} and {len(names)}")
-    return [(name, message, flow) for name, (message, flow) in zip(names, found)]
-
-
-def load_profiles():
-    """{constant: profile name} of topics.hpp."""
-    return dict(re.findall(r'k(\w+)Profile = "([^"]+)"', read("common/bus/topics.hpp")))
-
-
-def load_endpoints():
-    """{profile: its QoS} of config/qos/endpoints.xml."""
-    space = {"": "http://www.eprosima.com/XMLSchemas/fastRTPS_Profiles"}
-    tree = xml.fromstring(read("config/qos/endpoints.xml"))
-
-    def text(node, path):
-        found = node.find("/".join("{%s}%s" % (space[""], part) for part in path.split("/")))
-        return found.text if found is not None else ""
-
-    def seconds(node, path):
-        whole, parts = text(node, path + "/sec"), text(node, path + "/nanosec")
-        return f"{int(whole or 0) + int(parts or 0) / 1e9:g} s" if whole or parts else ""
-
-    endpoints = {}
-    for node in tree.iter():
-        name = node.get("profile_name")
-        if not name:
-            continue
-        depth = text(node, "topic/historyQos/depth")
-        endpoints[name] = {
-            "reliability": text(node, "qos/reliability/kind"),
-            "durability": text(node, "qos/durability/kind"),
-            "history": " ".join(filter(None, [text(node, "topic/historyQos/kind"), depth])),
-            "deadline": seconds(node, "qos/deadline/period"),
-            "lifespan": seconds(node, "qos/lifespan/duration"),
-        }
-    return endpoints
-
-
-def load_contract():
-    """The structs and enumerations of idl/sls.idl: ({name: [(type, name, comment)]}, {name: [(value, comment)]},
-    {name: comment before it})."""
-    structs, enums, comments = {}, {}, {}
-    for before, kind, name, body in re.findall(r"((?:^ *//.*\n)*)(?:^ *@final\n)?^ *(struct|enum) (\w+) *\{([^}]*)\}",
-                                               read("idl/sls.idl"), re.MULTILINE):
-        comments[name] = " ".join(line.strip().removeprefix("//").strip() for line in before.splitlines())
-        entries = []  # each with its comment, which may go on in the lines after it
-        for line in body.splitlines():
-            code, _, comment = map(str.strip, line.partition("//"))
-            if kind == "enum":
-                entries += [(value, "") for value in re.findall(r"[A-Z]\w+", code)]
-            elif match := re.match(r"(.+?)\s+(\w+)(\[\d+\])?;$", code):
-                entries.append((match[1] + (match[3] or ""), match[2], ""))
-            if comment and entries:
-                entries[-1] = (*entries[-1][:-1], f"{entries[-1][-1]} {comment}".strip())
-        (enums if kind == "enum" else structs)[name] = entries
-    return structs, enums, comments
-
-
-def load_faults():
-    """The error codes of a controller: [(number, name in files, name in the contract, meaning)]."""
-    enums = load_contract()[1]
-    header = re.search(r"enum class ErrorCode[^{]*\{(.*?)\};", read("common/model/answer.hpp"), re.DOTALL)[1]
-    meanings = re.findall(r"(k\w+),(?:\s*///< (.*))?", header)
-    texts = dict(re.findall(r'case ErrorCode::(k\w+):\s*return "(\w+)";', read("common/model/answer.hpp")))
-    wire = [value for value, _ in enums["FaultCode"]]
-    if len(wire) != len(meanings):
-        raise StaleReference("idl/sls.idl and common/model/answer.hpp have different numbers of error codes")
-    return [(number, texts[name], wire[number], meaning) for number, (name, meaning) in enumerate(meanings)]
-
-
-def load_exit_codes():
-    """[(code, meaning)] of every program."""
-    header = read("common/app/run_main.hpp")
-    codes = re.findall(r"kExit\w+ = (\d+);\s*///< (.*)", header)
-    return codes + [(code, f"Interrupted by {name}.") for code, name in re.findall(r"(\d+) \((SIG\w+)\)", header)]
