@@ -9,6 +9,7 @@
 #include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/scheduling.hpp"
+#include "common/app/wait.hpp"
 #include "common/bus/spinning.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "common/plugin/shared_library.hpp"
@@ -61,7 +62,7 @@ void Client::run() {
   announcer_.announce(core_.make_announcement());
   for (act(look()); core_.phase() != ClientCore::Phase::kEnded; act(look())) {
     announcer_.repeat_if_due();
-    std::this_thread::sleep_until(core_.next_deadline());
+    app::sleep_until(core_.next_deadline());
   }
   if (!core_.error().empty()) throw app::RunError(core_.error() + describe_obstacles());
 }
@@ -76,7 +77,7 @@ void Client::act(ClientCore::Act act) {
 ClientCore::Act Client::look() {
   if (answerer_) rethrow_answer_error();
   servers_.look_for_impostors();
-  const ClientCore::Now now{Clock::now(), options_.is_stopped(),
+  const ClientCore::Now now{sync::awake_clock().now(), options_.is_stopped(),
                             answerer_ && stream_->sees_server(answerer_->run().server)};
   const auto act =
       servers_.ask([&](const sync::Servers& servers) { return core_.look(servers, now); });

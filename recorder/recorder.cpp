@@ -55,7 +55,7 @@ void Recorder::run() {
   announce();
   for (act(look()); core_.phase() != RecorderCore::Phase::kEnded; act(look())) {
     announcer_.repeat_if_due();
-    std::this_thread::sleep_until(core_.next_deadline());
+    app::sleep_until(core_.next_deadline());
   }
   if (!core_.error().empty())
     throw app::RunError(core_.error() + (core_.run() ? "" : node_.describe_isolation()));
@@ -81,7 +81,7 @@ RecorderCore::Act Recorder::look() {
 
 RecorderCore::Now Recorder::look_around() const {
   RecorderCore::Now now;
-  now.time = std::chrono::steady_clock::now();
+  now.time = sync::awake_clock().now();
   now.interruption = app::describe_stop();
   if (!writing_) return now;
   now.is_closed = writing_->has_ended();  // first: the last step does not change after it
@@ -111,7 +111,7 @@ void Recorder::report() {
   const bus::PeerId server = core_.run()->server;
   const app::Wait wait(2);
   while (servers_.is_present(server) && !announcer_.reaches(server) && !wait.is_over())
-    std::this_thread::sleep_for(app::kShortPollTime);
+    app::sleep_for(app::kShortPollTime);
   announcer_.wait_for_acknowledgments(1s);
   core_.on_recorded(writing_->recorded(), app::describe_stop());
   writing_.reset();

@@ -3,27 +3,35 @@
 #include <algorithm>
 #include <exception>
 
+#include "common/app/wait.hpp"
+
 namespace sls::sim {
+namespace {
+
+sync::Time now() { return sync::awake_clock().now(); }
+
+}  // namespace
 
 void CoreLoop::run(ServerCore& core) {
   commands_.take_all();  // of an earlier run
   std::unique_lock lock(core_mutex_);
   core_ = &core;
-  unanswered_ = Clock::now();
+  unanswered_ = now();
   while (core.phase() != ServerCore::Phase::kEnded) {
     deadline_ = core.next_deadline();
     awaits_answers_ = core.phase() == ServerCore::Phase::kAwaitingAnswers;
     lock.unlock();
     write_waiting(core);
     const bool is_late = wait_until_due();
+    app::log_stop();
     main_wants_core_ = true;
     lock.lock();
     main_wants_core_ = false;
-    if (const auto now = Clock::now(); is_late && !core.is_look_due(now)) unanswered_ = now;
-    if (core.has_news(around_)) core.on_look(around_, Clock::now());
+    if (const auto time = now(); is_late && !core.is_look_due(time)) unanswered_ = time;
+    if (core.has_news(around_)) core.on_look(around_, now());
     deliver_events(core);
-    core.on_time(Clock::now());
-    if (const auto now = Clock::now(); core.is_look_due(now)) core.on_look(around_, now);
+    core.on_time(now());
+    if (const auto time = now(); core.is_look_due(time)) core.on_look(around_, time);
   }
   core_ = nullptr;
   lock.unlock();
@@ -36,7 +44,7 @@ void CoreLoop::write_waiting(ServerCore& core) {
       backlog_.write_waiting();
     } catch (const std::exception& error) {  // such as a reader that acknowledges nothing
       const std::lock_guard lock(core_mutex_);
-      core.on_failure(error.what(), Clock::now());
+      core.on_failure(error.what(), now());
     }
   }
 }
@@ -47,10 +55,12 @@ bool CoreLoop::wait_until_due() {
     // Each step that the middleware's thread takes meanwhile moves the deadline.
     const sync::Time deadline = deadline_.load();
     sleeps_until_ = deadline;
+    sync::awake_clock().expect_look(deadline);
     const bool has_slack = is_lockstep_ && awaits_answers_;
-    const auto slack = has_slack ? calc_slack(Clock::now() - unanswered_) : Clock::duration::zero();
-    if (backlog_.is_waiting() || commands_.wait(deadline + slack)) return false;
-  } while (Clock::now() < deadline_.load());
+    const auto slack = has_slack ? calc_slack(now() - unanswered_) : Clock::duration::zero();
+    if (backlog_.is_waiting() || commands_.wait(sync::awake_clock().to_steady(deadline + slack)))
+      return false;
+  } while (now() < deadline_.load());
   return true;
 }
 
@@ -59,8 +69,7 @@ CoreLoop::Clock::duration CoreLoop::calc_slack(Clock::duration duration) {
 }
 
 void CoreLoop::deliver_events(ServerCore& core) {
-  for (const SimControl& request : requests_.take_all())
-    core.on_request(request, around_, Clock::now());
+  for (const SimControl& request : requests_.take_all()) core.on_request(request, around_, now());
   for (CommandSample& sample : commands_.take_all()) core.on_commands(sample);
 }
 

@@ -62,9 +62,11 @@ void Program::exit(int code, std::string reason) {
 void Program::wake_at(sync::Time time) {
   const Instant latency(setting_.random.integer(5'000, 60'000));
   const Instant due =
-      std::max(process_.host().find(time), setting_.timeline.now() + latency) + slowness_;
+      std::max(process_.host().find(clock_.to_steady(time)), setting_.timeline.now() + latency) +
+      slowness_;
   if (due >= wakes_) return;
   wakes_ = due;
+  clock_.expect_look(time);
   process_.run_at(due, [this, number = ++wake_number_] {
     if (number != wake_number_) return;  // it woke earlier
     wakes_ = Instant::max();

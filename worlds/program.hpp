@@ -5,6 +5,7 @@
 #include <string>
 #include <utility>
 
+#include "common/sync/awake_clock.hpp"
 #include "common/sync/membership.hpp"
 #include "common/sync/servers.hpp"
 #include "worlds/plan.hpp"
@@ -54,7 +55,8 @@ class Program {
   bool is_slow() const { return slowness_ > Instant(0); }
 
  protected:
-  sync::Time now() const { return process_.host().now(); }
+  /// Awake time of this program.
+  sync::Time now() const { return clock_.look(process_.host().now()); }
   void say(std::string text);
   void say(const sync::Line& line);
   /// Wakes the main thread at `time` of this host's clock, or earlier if that was asked for.
@@ -87,6 +89,7 @@ class Program {
   sync::Servers servers_;
   sync::Membership members_;
   std::string stop_signal_;
+  mutable sync::AwakeClock clock_;
 
  private:
   void look_for_unclaimed();

@@ -183,7 +183,7 @@ void ServerProgram::on_commands(const Commands& sample, const Peer::Arrival& arr
 // --- outputs -------------------------------------------------------------------------------------
 
 sim::Moment ServerProgram::send_states(const sim::Fleet& fleet) {
-  const sim::Moment moment{now(), process_.host().wall()};
+  const sim::Moment moment{now(), process_.host().wall(), clock_.stopped()};
   setting_.properties.on_published(core_->run_id(), fleet.step(),
                                    setting_.flown->scenario.sync.wait_for);
   setting_.on_step(fleet.step());

@@ -2,6 +2,7 @@
 
 #include <chrono>
 
+#include "common/sync/awake_clock.hpp"
 #include "common/sync/patience.hpp"
 
 namespace sls::app {
@@ -11,6 +12,14 @@ inline constexpr auto kPollTime = std::chrono::milliseconds(20);
 
 /// The same before the first step and after the last one: a flight can be shorter than these waits.
 inline constexpr auto kShortPollTime = std::chrono::milliseconds(5);
+
+/// Sleeps until `due`, of awake time: the next look of the main thread. Logs a stop of the program
+/// before it, which is nobody's silence.
+void sleep_until(sync::Time due);
+/// As sleep_until, for `duration`.
+void sleep_for(sync::Duration duration);
+/// Logs for how long the program was stopped since the last call, if it was.
+void log_stop();
 
 /// sync::Patience that asks the clock.
 class Wait {
@@ -26,7 +35,7 @@ class Wait {
   double seconds_left() const { return patience_.seconds_left(now()); }
 
  private:
-  static sync::Time now() { return std::chrono::steady_clock::now(); }
+  static sync::Time now() { return sync::awake_clock().now(); }
 
   sync::Patience patience_;
 };

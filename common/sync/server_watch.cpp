@@ -10,7 +10,6 @@ namespace sls::sync {
 ServerWatch::Finding ServerWatch::look(const std::optional<Time>& heard, Time now) {
   constexpr auto kQuietTime = std::chrono::seconds(1);
   report_.reset();
-  heard_ += note_look(looked_, now);
   heard_ = std::max(heard_, heard.value_or(heard_));
   if (now - heard_ < kQuietTime) {
     if (std::exchange(is_reported_, false))

@@ -16,12 +16,10 @@ class ServerWatch {
  public:
   /// Watches run `run_id` from `now` on; its server is lost after `deadline_s` of silence.
   ServerWatch(std::uint64_t run_id, double deadline_s, Time now)
-      : run_id_(run_id), deadline_s_(deadline_s), heard_(now), looked_(now) {}
+      : run_id_(run_id), deadline_s_(deadline_s), heard_(now) {}
 
   enum class Finding { kThere, kSilent, kLost };
   /// `heard`: when the last status came (Servers::find_last_heard). Call it several times a second.
-  /// A gap of more than 0.5 s between calls means that this process itself was stopped: the gap
-  /// does not count as silence of the server.
   Finding look(const std::optional<Time>& heard, Time now);
 
   /// The line of the last look, if there is something to say: a warning of silence, or that the
@@ -35,7 +33,6 @@ class ServerWatch {
   const std::uint64_t run_id_;
   const double deadline_s_;
   Time heard_;
-  Time looked_;
   std::optional<Patience> wait_;  // while it is silent
   bool is_reported_ = false;
   std::optional<Line> report_;

@@ -18,9 +18,6 @@ using namespace std::chrono_literals;
 constexpr std::size_t kMaxWaiting = 64;
 constexpr double kMaxStuckTime = 10;  // s
 
-/// Longest time between two calls that counts: while this process is stopped, nothing can arrive.
-constexpr auto kLongestPass = 1s;
-
 /// A late answer comes at most this many steps later (idl/sls.idl).
 constexpr std::uint64_t kMaxLateness = 64;
 
@@ -42,7 +39,6 @@ Stream::Stream(const Parameters& parameters, std::uint64_t first_step, Sink sink
 // --- batches -------------------------------------------------------------------------------------
 
 void Stream::add(const RecordBatch& batch, sync::Time now) {
-  note_time(now);
   is_quiet_ = false;
   if (!next_batch_) next_batch_ = batch.batch_index();
   if (batch.batch_index() == *next_batch_ && !has_ended_) {
@@ -74,13 +70,7 @@ void Stream::skip_missing_batches() {
   handle_waiting_batches();
 }
 
-void Stream::note_time(sync::Time now) {
-  if (stuck_ && now - time_ > kLongestPass) stuck_->extend(now - time_ - kLongestPass);
-  time_ = now;
-}
-
 void Stream::on_time(sync::Time now) {
-  note_time(now);
   if (!stuck_ || !stuck_->is_over(now)) return;
   // If nothing has come meanwhile, the later gaps have waited as long as the first one.
   do skip_missing_batches();

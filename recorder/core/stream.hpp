@@ -41,8 +41,7 @@ class Stream {
   /// none has come at all in this time, no further missing batch is waited for.
   void add(const RecordBatch& batch, sync::Time now);
 
-  /// Call it several times a second. A gap of more than 1 s between calls, also of `add`, means
-  /// that this process was stopped: only 1 s of it counts.
+  /// Call it several times a second.
   void on_time(sync::Time now);
 
   /// A text with the missing batch, if a line about it is due: after 1 s, then every 5 s.
@@ -64,7 +63,6 @@ class Stream {
   const DroppedEntries& dropped() const { return dropped_; }
 
  private:
-  void note_time(sync::Time now);
   void handle(const RecordBatch& batch);
   /// Handles the record in `next_`.
   void handle_next();
@@ -83,7 +81,6 @@ class Stream {
   std::map<std::uint64_t, RecordBatch> waiting_;  // batches after next_batch_
   std::optional<sync::Patience> stuck_;  // with the missing batch, since the last handled one
   bool is_quiet_ = true;                 // no batch has come since then
-  sync::Time time_;
   bool has_ended_ = false;
   std::map<std::uint32_t, std::uint64_t> next_steps_;
   std::uint64_t newest_step_ = 0;

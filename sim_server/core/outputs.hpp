@@ -20,6 +20,7 @@ class Vehicle;
 struct Moment {
   sync::Time time{};
   std::chrono::system_clock::time_point wall{};  ///< the clock that sample stamps use
+  sync::Duration stopped{0};                     ///< for which the program was stopped until then
 };
 
 /// The orders of a server's core to its shell. No function blocks or calls the core. States

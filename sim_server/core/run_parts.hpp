@@ -30,9 +30,8 @@ struct RunParts {
     for (const std::string& remark : fleet.take_remarks()) report.announce(remark, now);
   }
 
-  /// The run was at rest for `rest`, which counts neither as absence nor as delay.
+  /// No controller was waited for during `rest`.
   void note_rest(sync::Duration rest) {
-    report.series.note_rest(rest);
     fleet.note_rest(rest);
     absence.note_rest(rest);
   }

@@ -195,24 +195,37 @@ void ServerCore::go_on(sync::Time now) {
 void ServerCore::publish_if_allowed(sync::Time now) {
   if (parts_.control.holds()) {
     if (phase_ == Phase::kResting) return;
+    end_rest(now);
     phase_ = Phase::kResting;
     rest_began_ = now;
     return parts_.outputs.flush_records();
   }
-  if (phase_ == Phase::kResting) {
-    parts_.note_rest(now - rest_began_);
-    pacing_->note_rest(now - rest_began_);
-  }
-  phase_ = Phase::kAwaitingRecorders;
+  if (phase_ == Phase::kResting) end_rest(now);
   if (!recorders_.allows(parts_.watch.roster(), parts_.fleet.step(),
-                         parts_.outputs.is_record_full(), now))
+                         parts_.outputs.is_record_full(), now)) {
+    if (phase_ != Phase::kAwaitingRecorders) rest_began_ = now;
+    phase_ = Phase::kAwaitingRecorders;
     return;
+  }
+  end_rest(now);
   phase_ = Phase::kAwaitingDue;
   if (now < pacing_->due()) return;
   phase_ = Phase::kAwaitingAnswers;
   const Moment moment = parts_.outputs.send_states(parts_.fleet);
   published_ = moment.time;
   pacing_->published(moment);
+}
+
+/// While the run rests between two steps, nobody is waited for but an operator or recorders.
+void ServerCore::end_rest(sync::Time now) {
+  const sync::Duration rest = now - rest_began_;
+  if (phase_ == Phase::kResting) {
+    parts_.report.series.note_rest(rest);
+    recorders_.note_rest(rest);
+    pacing_->note_rest(rest);
+  }
+  if (phase_ == Phase::kResting || phase_ == Phase::kAwaitingRecorders) parts_.note_rest(rest);
+  phase_ = Phase::kAwaitingDue;
 }
 
 void ServerCore::finish_step(sync::Time now) {

@@ -110,6 +110,7 @@ class ServerCore {
   void begin_flight(sync::Time now);
   void go_on(sync::Time now);
   void publish_if_allowed(sync::Time now);
+  void end_rest(sync::Time now);
   void finish_step(sync::Time now);
   void keep_house(Surroundings& around, sync::Time now);
   void end_run(End end, RunPhase phase, const std::string& reason, sync::Time now);

@@ -14,6 +14,7 @@ using namespace std::chrono_literals;
 
 void LockstepPacing::published(const Moment& moment) {
   sent_ = last_sent_ = looked_ = moment.time;
+  paused_ = {};
   resend_at_ = sent_ + timer_.timeout();
   look_at_ = resend_at_;
   is_late_ = false;
@@ -47,11 +48,19 @@ void LockstepPacing::attend_to_silence(sync::Time now) {
   is_late_ = true;
   for (const auto& vehicle : run_.fleet.vehicles())
     if (!vehicle->gate.accepted()) vehicle->note_waiting(sent_);
-  if (run_.control.holds()) run_.note_rest(now - looked_);  // a pause does not count as absence
+  const bool is_paused = run_.control.holds();
+  if (is_paused) {  // that does not count as absence, and nothing is flown without answers
+    run_.report.series.note_rest(now - looked_);
+    run_.note_rest(now - looked_);
+    paused_ += now - looked_;
+    take_over_at_ += now - looked_;
+  }
   looked_ = now;
   if (now >= resend_at_) resend(now);
-  take_over_if_silent(now);
-  if (!run_.fleet.are_all_accepted()) fly_without_answers(now);
+  if (!is_paused) {
+    take_over_if_silent(now);
+    if (!run_.fleet.are_all_accepted()) fly_without_answers(now);
+  }
   const auto next_look = now + 1ms;
   look_at_ = std::min(
       resend_at_, run_.fleet.is_anybody_absent() ? next_look : std::max(take_over_at_, next_look));
@@ -70,7 +79,7 @@ void LockstepPacing::resend(sync::Time now) {
 /// Settles the step unless, by the policy, a vehicle without an answer still waits for it.
 void LockstepPacing::fly_without_answers(sync::Time now) {
   using Action = AbsenceAction;
-  const double step_wait_s = sync::to_seconds(now - sent_);
+  const double step_wait_s = sync::to_seconds(now - sent_ - paused_);
   std::vector<std::pair<Vehicle*, Action>> actions;
   for (const auto& vehicle : run_.fleet.vehicles())
     if (!vehicle->gate.accepted())

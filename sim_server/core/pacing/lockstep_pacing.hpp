@@ -29,6 +29,7 @@ class LockstepPacing : public Pacing {
   RunParts& run_;
   RetransmissionTimer timer_;
   sync::Time sent_{}, last_sent_{};  // when the step's states were sent, first and last
+  sync::Duration paused_{0};         // of the time since then
   sync::Time resend_at_{};
   sync::Time look_at_{};  // next check for missing answers
   sync::Time looked_{};   // the last one

@@ -42,8 +42,10 @@ void RealtimePacing::begin(sync::Time now) {
 
 void RealtimePacing::published(const Moment& moment) {
   const std::uint64_t step = run_.fleet.step();
-  if (const auto lost = schedule_.slip(step, moment.time))
-    run_.report.series.timing.add_slip(sync::to_seconds(*lost));
+  // The schedule is of awake time, so a stop of this program moves it.
+  const sync::Duration stopped = moment.stopped - std::exchange(stopped_, moment.stopped);
+  const auto lost = schedule_.slip(step, moment.time).value_or(sync::Duration(0)) + stopped;
+  if (lost > sync::Duration(0)) run_.report.series.timing.add_slip(sync::to_seconds(lost));
   run_.report.series.timing.add_delay(sync::to_seconds(moment.time - schedule_.due(step)));
   published_ = moment.time;
   close_at_ = schedule_.close(step, published_);
@@ -76,6 +78,7 @@ bool RealtimePacing::is_ending() const {
 }
 
 bool RealtimePacing::wait_for_last_answers(sync::Time now) {
+  if (!is_ending()) last_attempts_ = 0;  // a late end may have been withdrawn
   if (last_attempts_ == 0 && !is_ending()) return false;
   if (last_attempts_ == kLastAttempts)
     throw std::runtime_error(

@@ -49,6 +49,7 @@ class RealtimePacing : public Pacing {
   sync::Time published_{};  // the state in work
   sync::Time close_at_{};
   int last_attempts_ = 0;                          // to get the answers to the last step
+  sync::Duration stopped_{0};                      // of the program until the last state
   std::optional<std::uint64_t> missed_deadlines_;  // count of the middleware at the last look
   std::optional<std::chrono::nanoseconds> lifespan_;
   ClientClocks clocks_;

@@ -7,8 +7,6 @@
 namespace sls::sim {
 
 void Preparation::claim(const Surroundings& around, sync::Time now) {
-  // A server that was stopped did not listen: what came meanwhile is still to be read.
-  began_ += sync::note_look(looked_, now);
   // Of two servers the one that looks later finds the port of the other open and waits for its
   // claim, however slow discovery is.
   const bool is_settled = is_claim_settled(now - began_, around.stays_on_this_machine(),

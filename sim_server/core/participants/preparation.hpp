@@ -14,7 +14,7 @@ namespace sls::sim {
 class Preparation {
  public:
   /// Begins with the claim at `now`.
-  Preparation(RunParts& run, sync::Time now) : run_(run), began_(now), looked_(now) {}
+  Preparation(RunParts& run, sync::Time now) : run_(run), began_(now) {}
 
   bool is_claimed() const { return gathering_.has_value(); }
   /// Looks whether the claim is settled; then the gathering begins.
@@ -31,7 +31,6 @@ class Preparation {
  private:
   RunParts& run_;
   sync::Time began_;  // to listen
-  sync::Time looked_;
   std::optional<Gathering> gathering_;
 };
 

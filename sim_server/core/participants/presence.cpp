@@ -7,8 +7,7 @@ namespace sls::sim {
 
 void Presence::look(std::vector<sync::Member>& controllers,
                     const std::map<bus::PeerId, Answering>& answering, Clock::time_point now) {
-  const Clock::duration elapsed =
-      std::min<Clock::duration>(now - std::exchange(looked_, now), sync::kLongestLook);
+  const Clock::duration elapsed = now - std::exchange(looked_, now);
   std::map<bus::PeerId, Seen> present;
   for (auto& entry : controllers) {
     const auto known = seen_.find(entry.peer);

@@ -21,8 +21,7 @@ class Presence {
  public:
   using Clock = std::chrono::steady_clock;
 
-  /// Sets `is_gone` of `controllers`, which are all of the run. Call it several times a second. A
-  /// longer gap between calls counts as sync::kLongestLook.
+  /// Sets `is_gone` of `controllers`, which are all of the run. Call it several times a second.
   void look(std::vector<sync::Member>& controllers,
             const std::map<bus::PeerId, Answering>& answering, Clock::time_point now);
 

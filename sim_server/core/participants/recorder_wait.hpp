@@ -24,6 +24,12 @@ class RecorderWait {
   /// The number of record entries sent so far. While it grows, only the network is slow.
   void note_written(std::uint64_t written) { written_ = written; }
 
+  /// The run was at rest for `rest`, which does not count.
+  void note_rest(sync::Duration rest) {
+    for (Wait* wait : {&full_, &behind_})
+      if (wait->patience) wait->patience->extend(rest);
+  }
+
   /// True if `step` may be published. `is_full`: the records of the last steps are far from being
   /// sent.
   /// @throws std::runtime_error if the recorders were waited for too long.

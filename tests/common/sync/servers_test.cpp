@@ -233,15 +233,5 @@ TEST(ClaimTest, AServerServesTheVehiclesItNames) {
   EXPECT_EQ(list_vehicle_ids(claim(1, {0, 7})), std::vector<std::uint32_t>({0, 7}));
 }
 
-// This process was stopped, or its machine slept: the server was not watched meanwhile.
-TEST(ServerWatchTest, AGapBetweenLooksIsNoSilence) {
-  ServerWatch watch(kRun, 7, at(0));
-  EXPECT_EQ(watch.look(at(0), at(501)), ServerWatch::Finding::kThere);
-  EXPECT_EQ(watch.look(at(0), at(60'000)), ServerWatch::Finding::kThere);
-  for (std::int64_t ms = 60'100; ms < 61'000; ms += 100)
-    EXPECT_EQ(watch.look(at(0), at(ms)), ServerWatch::Finding::kThere);
-  EXPECT_EQ(watch.look(at(0), at(61'000)), ServerWatch::Finding::kSilent);
-}
-
 }  // namespace
 }  // namespace sls::sync

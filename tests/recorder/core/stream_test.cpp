@@ -154,17 +154,6 @@ TEST_F(MissingBatchTest, EachBatchInOrderBeginsTheWaitAgain) {
   EXPECT_EQ(stream_.last_step(), 8) << "since then nothing has come, so batch 7 is missing, too";
 }
 
-TEST_F(MissingBatchTest, OfTimeInWhichTheRecorderIsStoppedASecondCounts) {
-  add_at(0, 0);
-  add_at(0, 2);
-  look_until(8900);
-  now_ = 70'000;
-  look_until(70'000);
-  EXPECT_EQ(stream_.last_step(), 0) << "9.9 s";
-  look_until(70'100);
-  EXPECT_EQ(stream_.last_step(), 2);
-}
-
 TEST_F(StreamTest, HistoryBeforeTheFirstStepOfASegmentIsLeftOut) {
   Stream stream = make_stream(parameters_, 50);
   EXPECT_EQ(stream.last_step(), 49);

@@ -89,15 +89,6 @@ TEST_F(PresenceTest, APauseIsNoSilenceOfOneThatHasAnswered) {
   EXPECT_FALSE(is_gone_after(1900ms)) << "counts from the next state on";
 }
 
-TEST_F(PresenceTest, TimeInWhichTheServerItselfWasStoppedDoesNotCount) {
-  entry_.is_repeated = true;
-  EXPECT_FALSE(look());
-  EXPECT_FALSE(look(10min));
-  EXPECT_FALSE(look());
-  announce();
-  EXPECT_FALSE(look());
-}
-
 TEST_F(PresenceTest, OneThatLeftAndCameBackIsNew) {
   entry_.is_repeated = true;
   EXPECT_TRUE(is_gone_after(3s));

@@ -358,6 +358,19 @@ TEST(ServerLockstepTest, TheNextClientTakesOverAfterItsTimeAndTheFirstComesBack)
   EXPECT_EQ(rig.status().counters().take_overs(), 2u);
 }
 
+TEST(ServerLockstepTest, APausedStepIsNotFlownWithoutItsAnswer) {
+  ServerRig rig(with_policy(config::ControllerPolicy::kHold, 1));
+  rig.join("pilot");
+  rig.wait_until(500);
+  rig.request(ControlAction::ACTION_PAUSE);
+  rig.wait_until(20'000);
+  rig.request(ControlAction::ACTION_RESUME);
+  rig.wait_until(20'490);
+  EXPECT_EQ(rig.take_records(), Lines{}) << "0.99 s of 1 s";
+  rig.wait_until(20'520);
+  EXPECT_EQ(rig.take_records().front(), "0 fail-safe");
+}
+
 // --- recorders -----------------------------------------------------------------------------------
 
 config::Scenario with_recorder(config::RecorderPolicy policy) {
@@ -579,6 +592,37 @@ TEST(ServerLockstepTest, AMistakeOfAParticipantIsInTheStatusWithinTheTimeOfALook
   rig.problem = "'foo' (10.0.0.2): another vendor's DDS";
   rig.wait(120);
   EXPECT_EQ(rig.status().problem().to_string(), rig.problem);
+}
+
+TEST(ServerLockstepTest, APauseIsNoWaitForRecorders) {
+  ServerRig rig(with_recorder(config::RecorderPolicy::kWait));
+  rig.note_recorder("disk", -1);
+  rig.join("pilot");
+  rig.leave("disk");
+  rig.answer("pilot", 0);
+  rig.wait(5000);
+  rig.request(ControlAction::ACTION_PAUSE);
+  rig.wait(20'000);
+  rig.request(ControlAction::ACTION_RESUME);
+  rig.wait(4900);
+  EXPECT_EQ(rig.core().error(), "");
+  rig.wait(200);
+  EXPECT_NE(rig.core().error(), "");
+}
+
+TEST(ServerLockstepTest, AWaitForRecordersIsNoAbsenceOfTheController) {
+  auto scenario = with_recorder(config::RecorderPolicy::kWait);
+  scenario.sync.wait.controller = {config::ControllerPolicy::kHold, 1};
+  scenario.sync.wait_for.timeout_s = 5;
+  ServerRig rig(scenario);
+  rig.note_recorder("disk", -1);
+  rig.join("pilot");
+  rig.leave("disk");
+  rig.wait(1100);  // step 0 is flown without an answer; step 1 waits for a recorder
+  rig.wait(8000);
+  rig.note_recorder("disk", 0);
+  rig.wait(1000);
+  EXPECT_EQ(rig.core().error(), "");
 }
 
 }  // namespace

@@ -60,19 +60,6 @@ TEST(ServerStartTest, ARunThatEndsBeforeTheClaimIsSettledIsNoRival) {
   EXPECT_EQ(rig.phase(), Phase::kGathering);
 }
 
-TEST(ServerStartTest, AServerThatWasStoppedListensAgain) {
-  ServerRig rig(ServerRig::make_scenario(), kClaims);
-  rig.other_runs = {make_rival(ServerRig::kRunId - 1)};
-  rig.wait_until(100);
-  rig.jump_to(3000);  // the rival's status waits in the queues
-  EXPECT_EQ(rig.phase(), Phase::kClaiming);
-  rig.other_runs.front().status = sync::status(ServerRig::kRunId - 1, RunPhase::PHASE_FINISHED);
-  rig.wait_until(3149);
-  EXPECT_EQ(rig.phase(), Phase::kClaiming);
-  rig.wait_until(3150);
-  EXPECT_EQ(rig.phase(), Phase::kGathering);
-}
-
 TEST(ServerStartTest, AServerInALaterPhaseLosesToNoClaim) {
   ServerRig rig;
   rig.other_runs = {make_rival(ServerRig::kRunId - 1)};

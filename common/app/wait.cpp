@@ -1,0 +1,29 @@
+#include "common/app/wait.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <thread>
+#include <utility>
+
+namespace sls::app {
+
+void sleep_until(sync::Time due) {
+  sync::AwakeClock& clock = sync::awake_clock();
+  clock.expect_look(due);
+  std::this_thread::sleep_until(clock.to_steady(due));
+  clock.now();
+  log_stop();
+}
+
+void sleep_for(sync::Duration duration) { sleep_until(sync::awake_clock().now() + duration); }
+
+void log_stop() {
+  constexpr auto kWorthALine = std::chrono::milliseconds(500);
+  static sync::Duration logged{0};
+  const sync::Duration stopped = sync::awake_clock().stopped();
+  if (stopped - logged < kWorthALine) return;
+  spdlog::warn("this program was stopped for {:.1f} s, which counts as nobody's silence",
+               sync::to_seconds(stopped - std::exchange(logged, stopped)));
+}
+
+}  // namespace sls::app
