@@ -182,6 +182,9 @@ test("no WebGL: a table of positions and the plots", async () => {
     assert.equal((await state(page)).has_scene, false);
     await waitFor("numbers in the table", () => page.$eval("#table tbody td:nth-child(2)", ({ textContent }) => /\d/.test(textContent)));
     await waitFor("a plot", () => page.$("#plots canvas"));
+    // A weight in z would flatten x and y.
+    const titles = await page.$$eval(".plot-title", (all) => all.map(({ textContent }) => textContent));
+    for (const title of ["Force x, y", "Force z"]) assert.ok(titles.includes(title), title);
   };
   await withPage([], {}, check, { expected: /./, browser: flat.browser }).finally(flat.stop);
 });
