@@ -41,8 +41,8 @@ struct Options {
   std::uint32_t vehicle_id = 0;
   std::string identity = "viewer";  ///< role whose keys it uses on a secured domain
   bool has_ros_face = false;
-  std::filesystem::path token_file;  ///< empty: no token
-  std::filesystem::path shown_recording = "recordings";
+  std::filesystem::path token_file;       ///< empty: no token
+  std::filesystem::path shown_recording;  ///< empty: "recordings"
   view::ServerOptions server;
 
   /// Puts the token and the address into `server`.
@@ -59,9 +59,9 @@ void add_options(CLI::App& cli, Options& options) {
       ->default_str("");
   cli.add_option("--recording", options.shown_recording,
                  "recording of the live flight, or a folder of recordings: a page opened late "
-                 "gets from it what was flown before, at the end all")
+                 "gets from it what was flown before, at the end all (default: recordings)")
       ->type_name("DIR")
-      ->excludes("DIR");
+      ->default_str("");
   cli.add_option("--vehicle", options.vehicle_id, "watch the server that flies vehicle N")
       ->type_name("N");
   cli.add_option("--listen", options.server.address,
@@ -99,6 +99,10 @@ void Options::complete() {
   if (has_ros_face && !recordings.empty())
     throw config::ConfigError("--ros: expected no recording with it, got " +
                               recordings.front().string());
+  if (!shown_recording.empty() && !recordings.empty())
+    throw config::ConfigError("--recording: expected no recording to replay with it, got " +
+                              recordings.front().string());
+  if (shown_recording.empty()) shown_recording = "recordings";
   if (!token_file.empty()) server.access.token = view::load_token(token_file.string());
   server.access.address = server.address;
   view::check(server.access);
