@@ -1,5 +1,6 @@
 #include <spdlog/spdlog.h>
 
+#include <csignal>
 #include <optional>
 
 #include "common/app/run_main.hpp"
@@ -8,6 +9,7 @@
 #include "common/bus/node.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/config/config_error.hpp"
+#include "common/sync/servers.hpp"
 #include "recorder/sinks/csv/csv_reader.hpp"
 #include "tools/view/foxglove/session.hpp"
 #include "tools/view/live/feed.hpp"
@@ -16,6 +18,7 @@
 #include "tools/view/page/page.hpp"
 #include "tools/view/replay/export.hpp"
 #include "tools/view/replay/recorded_run.hpp"
+#include "tools/view/replay/shown_recording.hpp"
 #include "tools/view/ros_face/ros_face.hpp"
 #include "tools/view/web/server.hpp"
 
@@ -24,6 +27,9 @@ namespace {
 using namespace sls;
 
 constexpr double kSignalTime = 0.1;  // s between two looks for a stop signal
+// Looks after SIGTERM, which `sls run --view` sends after the flight: open pages still ask for the
+// recording, and get it.
+constexpr int kLeastLooks = 5, kMostLooks = 100;
 
 // --- the command line ----------------------------------------------------------------------------
 
@@ -35,7 +41,8 @@ struct Options {
   std::uint32_t vehicle_id = 0;
   std::string identity = "viewer";  ///< role whose keys it uses on a secured domain
   bool has_ros_face = false;
-  std::filesystem::path token_file;  ///< empty: no token
+  std::filesystem::path token_file;       ///< empty: no token
+  std::filesystem::path shown_recording;  ///< empty: "recordings"
   view::ServerOptions server;
 
   /// Puts the token and the address into `server`.
@@ -49,6 +56,11 @@ void add_options(CLI::App& cli, Options& options) {
                  "one or two recordings to replay (default: the live flight on the domain)")
       ->expected(0, 2)
       ->type_name("")
+      ->default_str("");
+  cli.add_option("--recording", options.shown_recording,
+                 "recording of the live flight, or a folder of recordings: a page opened late "
+                 "gets from it what was flown before, at the end all (default: recordings)")
+      ->type_name("DIR")
       ->default_str("");
   cli.add_option("--vehicle", options.vehicle_id, "watch the server that flies vehicle N")
       ->type_name("N");
@@ -87,6 +99,10 @@ void Options::complete() {
   if (has_ros_face && !recordings.empty())
     throw config::ConfigError("--ros: expected no recording with it, got " +
                               recordings.front().string());
+  if (!shown_recording.empty() && !recordings.empty())
+    throw config::ConfigError("--recording: expected no recording to replay with it, got " +
+                              recordings.front().string());
+  if (shown_recording.empty()) shown_recording = "recordings";
   if (!token_file.empty()) server.access.token = view::load_token(token_file.string());
   server.access.address = server.address;
   view::check(server.access);
@@ -102,13 +118,29 @@ view::Resource make_page() {
   return page;
 }
 
-/// Serves until a stop signal.
-void serve(view::Server& server) {
-  server.repeat(kSignalTime, [&server] {
-    if (app::stop_signal() != 0) server.stop();
+/// Serves until a stop signal; after SIGTERM until `is_idle`, too.
+void serve(
+    view::Server& server, const std::function<bool()>& is_idle = [] { return true; }) {
+  server.repeat(kSignalTime, [&server, is_idle, looks = 0]() mutable {
+    const int signal = app::stop_signal();
+    const bool may_linger =
+        signal == SIGTERM && server.count_connections() > 0 && ++looks < kMostLooks;
+    if (signal != 0 && !(may_linger && (looks < kLeastLooks || !is_idle()))) server.stop();
   });
   spdlog::info("page: {}", server.url());
   server.run();
+}
+
+/// The answer of /history: the recording of the run that is shown, or a text that says why not.
+void answer_history(const view::Feed& feed, view::ShownRecording& recording,
+                    const std::function<void(const view::Resource&)>& done) {
+  const auto answer = [done](bool is_there, const view::Payload& bytes) {
+    done({is_there ? "application/octet-stream" : "text/plain; charset=utf-8", bytes, {}, {}});
+  };
+  const view::RunView* view = feed.run();
+  if (!view) return answer(false, std::make_shared<const std::string>("there is no flight"));
+  const bool is_over = view->run.status && sync::calc_progress(view->run.status) < 0;
+  recording.ask(view->run.parameters.run_id(), is_over, answer);
 }
 
 void watch(const Options& options) {
@@ -126,9 +158,11 @@ void watch(const Options& options) {
   server.add_protocol(view::make_page_protocol(feed, requests, page));
   server.add_protocol(view::make_foxglove_protocol(feed, requests));
   server.add_resource("/", make_page());
+  view::ShownRecording recording(options.shown_recording, post);
+  server.add_resource("/history", [&](const auto& done) { answer_history(feed, recording, done); });
   std::optional<view::RosFace> ros_face;
   if (options.has_ros_face) ros_face.emplace(node, feed);
-  serve(server);
+  serve(server, [&recording] { return recording.is_idle(); });
 }
 
 /// Reads everything once at the start, because recordings do not change while they are shown.

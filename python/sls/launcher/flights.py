@@ -102,7 +102,8 @@ def fly(options: Namespace, file: str) -> tuple[int, str]:
             run_program(BUILD / "bin" / name, "--check", *flight[name], stdout=subprocess.DEVNULL)
     with Supervisor() as supervisor:
         if options.view_port is not None:
-            supervisor.start_beside("sls_view", [BUILD / "bin/sls_view", f"--port={options.view_port}", *network])
+            supervisor.start_beside("sls_view", [BUILD / "bin/sls_view", f"--port={options.view_port}",
+                                                 f"--recording={recording}", *network])
         for name, words in flight.items():
             patience = [WRITERS_PATIENCE_S] if name in ("recorder", "closed_loop") else []
             supervisor.start(name, [BUILD / "bin" / name, *words], *patience)

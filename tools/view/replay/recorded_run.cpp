@@ -55,10 +55,11 @@ void fill_row(std::vector<float>& row, const record::StepRows& rows, std::size_t
 
 /// Reads rows and events in one pass over the files.
 void read_rows(const record::OpenedRecording& flight, std::size_t signals, KeptRows& kept,
-               RowEvents& events) {
+               RowEvents& events, const std::function<bool()>& must_stop) {
   record::StepReader reader(flight);
   std::vector<float> row;
   while (const auto rows = reader.next()) {
+    if (must_stop()) throw std::runtime_error(flight.folder.string() + ": interrupted");
     if (rows->step >= KeptRows::kMostSteps)
       throw record::DamagedError(fmt::format("{}: step: expected one below {}, got {}",
                                              flight.folder.string(), KeptRows::kMostSteps,
@@ -141,7 +142,8 @@ std::string join(const std::string& head, const KeptRows& kept) {
 
 }  // namespace
 
-std::string load_recorded_run(const fs::path& folder, std::size_t most_bytes) {
+std::string load_recorded_run(const fs::path& folder, std::size_t most_bytes,
+                              const std::string& name, const std::function<bool()>& must_stop) {
   const record::OpenedRecording flight = record::open_recording(folder);
   const auto [parameters, scenario] = load_parameters(flight);
   const std::size_t signals = parameters.signals().size();
@@ -149,13 +151,13 @@ std::string load_recorded_run(const fs::path& folder, std::size_t most_bytes) {
 
   KeptRows kept(flight.vehicle_ids(), kColumns.size() + signals, most_bytes);
   RowEvents events(period_s);
-  read_rows(flight, signals, kept, events);
+  read_rows(flight, signals, kept, events, must_stop);
   if (kept.steps_total() == 0)
     throw config::ConfigError(folder.string() + ": expected steps of a flight, got none");
 
   Json json;
   json["run"] = describe_flight(parameters);
-  json["name"] = name_of(folder);
+  json["name"] = name.empty() ? name_of(folder) : name;
   json["complete"] = flight.manifest().complete;
   json["outcome"] = describe_outcome(flight.manifest());
   json["events"] = describe_events(flight, period_s);

@@ -164,7 +164,10 @@ void HttpSession::answer() {
   const auto resource = hub_.resources.find(target->path);
   if (resource == hub_.resources.end())
     return refuse(http::status::not_found, "there is nothing at this path");
-  serve(resource->second);
+  deadline_.cancel();
+  resource->second([self = weak_from_this()](const Resource& made) {
+    if (const auto session = self.lock()) session->serve(made);
+  });
 }
 
 void HttpSession::upgrade(const RequestOrigin& origin) {
@@ -194,7 +197,8 @@ void HttpSession::serve(const Resource& resource) {
   set_common_fields(*response);
   response->set(http::field::content_type, resource.content_type);
   const bool is_gzip = resource.gzip_body && accepts_gzip(request);
-  const std::string& bytes = is_gzip ? *resource.gzip_body : *resource.body;
+  served_ = is_gzip ? resource.gzip_body : resource.body;
+  const std::string& bytes = *served_;
   if (is_gzip) response->set(http::field::content_encoding, "gzip");
   if (resource.gzip_body) response->set(http::field::vary, "Accept-Encoding");
   if (!resource.security_policy.empty())
@@ -234,6 +238,7 @@ void HttpSession::write(std::shared_ptr<http::response<Body>> response, std::siz
 }
 
 void HttpSession::note_written(Error error, bool is_last) {
+  served_.reset();
   if (error) return drop();
   if (is_last) return linger();
   read_request();

@@ -1,4 +1,4 @@
-/// HTTP of one connection: resources from memory, errors, upgrade to a WebSocket.
+/// HTTP of one connection: resources, errors, upgrade to a WebSocket.
 #pragma once
 
 #include <boost/beast/core/flat_buffer.hpp>
@@ -44,6 +44,7 @@ class HttpSession : public Client, public std::enable_shared_from_this<HttpSessi
   beast::flat_buffer buffer_;
   std::optional<http::request_parser<http::empty_body>> parser_;
   std::size_t discarded_ = 0;
+  Payload served_;  // bytes of the answer that is being written
 };
 
 }  // namespace sls::view

@@ -45,7 +45,7 @@ class Hub {
   net::io_context io{1};
   const AccessOptions access;
   const ServerLimits limits;
-  std::map<std::string, Resource, std::less<>> resources;
+  std::map<std::string, MakeResource, std::less<>> resources;
   std::vector<Protocol> protocols;
   std::atomic<std::size_t> websockets{0};
   std::size_t waiting_bytes = 0;  ///< sum over the clients

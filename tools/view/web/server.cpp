@@ -136,7 +136,11 @@ std::string Server::url() const {
 }
 
 void Server::add_resource(const std::string& path, Resource resource) {
-  impl_->hub.resources[path] = std::move(resource);
+  add_resource(path, [resource = std::move(resource)](const auto& done) { done(resource); });
+}
+
+void Server::add_resource(const std::string& path, MakeResource make) {
+  impl_->hub.resources[path] = std::move(make);
 }
 
 void Server::add_protocol(Protocol protocol) {

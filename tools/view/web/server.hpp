@@ -23,6 +23,9 @@ struct Resource {
   std::string security_policy;  ///< Content-Security-Policy, or empty
 };
 
+/// Makes the answer for a path anew; calls `done` later, on the server's thread.
+using MakeResource = std::function<void(std::function<void(const Resource&)> done)>;
+
 /// Limits of one server for its clients.
 struct ServerLimits {
   std::size_t connections =
@@ -57,8 +60,9 @@ class Server {
   /// "http://127.0.0.1:8765/".
   std::string url() const;
 
-  /// Call both before `run`. `path` begins with a slash.
+  /// Call these before `run`. `path` begins with a slash.
   void add_resource(const std::string& path, Resource resource);
+  void add_resource(const std::string& path, MakeResource make);
   void add_protocol(Protocol protocol);
 
   /// Makes the server's thread call `task`. May be called from any thread.

@@ -189,6 +189,9 @@ test("no WebGL: a table of positions and the plots", async () => {
     assert.equal((await state(page)).has_scene, false);
     await waitFor("numbers in the table", () => page.$eval("#table tbody td:nth-child(2)", ({ textContent }) => /\d/.test(textContent)));
     await waitFor("a plot", () => page.$("#plots canvas"));
+    // A weight in z would flatten x and y.
+    const titles = await page.$$eval(".plot-title", (all) => all.map(({ textContent }) => textContent));
+    for (const title of ["Force x, y", "Force z"]) assert.ok(titles.includes(title), title);
   };
   await withPage([], {}, check, { expected: /./, browser: flat.browser }).finally(flat.stop);
 });
@@ -226,6 +229,40 @@ test("a phone shows everything without scrolling sideways, and every control has
   });
 });
 
+test("a page opened in a pause shows what was flown before, and at the end the whole recording", async () => {
+  const paused = await startFlight({ rtf: 0.4 });
+  const expectWhole = (times, end) =>
+    assert.deepEqual(times.map((time) => Math.round(time / 0.004)), Array.from({ length: end + 1 }, (_, step) => step));
+  const readTimes = (page) => page.evaluate(() => window.slsView.plotted());
+  const readText = (page, place) => page.$eval(place, ({ dataset, textContent }) => `${dataset.kind} ${textContent}`);
+  await withPage(["--recording", join(paused.folder, "none")], {}, async (page) => {
+    await untilFlies(page, 100);
+    await waitFor("why not", async () => /Earlier steps.*none: expected the recording of run/.test(await readText(page, "#status")));
+    await press(page, "pause");
+  }, { on: paused });
+  await withPage(["--recording", paused.folder], {}, async (page, { viewer }) => {
+    const { step } = await waitFor("the pose of the recording", async () => (await state(page)).step && state(page));
+    expectWhole(await readTimes(page), step);
+    const pose = await page.evaluate(() => window.slsView.pose(0));
+    for (const part of ["quad", "load"])
+      pose[part].forEach((value, axis) => assert.ok(Math.abs(value - readRecorded(step, paused)[part][axis]) < 1e-6, `${part} ${value}`));
+    await press(page, "resume");
+    await untilFlies(page, step + 100);
+    const second = await open(chromium.browser);
+    await second.page.goto(viewer.url);
+    await untilFlies(second.page, step + 200);
+    const times = await waitFor("the history", async () => (await readTimes(second.page)).length > step + 100 && readTimes(second.page));
+    expectWhole(times.slice(0, step + 100), step + 99);
+    await second.close();
+    await page.click("[data-action=stop]");
+    await page.click("#confirm-yes");
+    await waitFor("replay", () => page.$("#time"));
+    assert.match(await readText(page, "#banner"), new RegExp(`^note .*its recording; ./sls view ${join(paused.folder, "recording")} shows`));
+    const end = readFileSync(join(paused.folder, "recording/state.csv"), "utf8").trimEnd().split("\n").length - 2;
+    expectWhole(await readTimes(page), end);
+  }, { on: paused }).finally(paused.stop);
+});
+
 test("after the end of a flight the page replays it, also without sls_view", async () => {
   const ended = await startFlight();
   await withPage([], { scheme: "light" }, async (page, { viewer }) => {
@@ -239,7 +276,7 @@ test("after the end of a flight the page replays it, also without sls_view", asy
     await page.click("#confirm-yes");
     await waitFor("replay", () => page.$("#time"));
     await viewer.stop();
-    assert.match(await page.$eval("#banner", ({ dataset, textContent }) => `${dataset.kind} ${textContent}`), /^note .*sls view/);
+    assert.match(await page.$eval("#banner", ({ dataset, textContent }) => `${dataset.kind} ${textContent}`), /^note .*received .recordings: expected.*sls view DIR/);
     const { pose, step } = await page.evaluate(() => {
       const { min, max } = document.getElementById("time");
       const step = Math.round((Number(min) + Number(max)) / 2 / 0.004); // of a period of 4 ms

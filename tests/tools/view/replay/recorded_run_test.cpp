@@ -12,7 +12,9 @@
 #include "tests/recorder/flights.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/text.hpp"
+#include "tests/tools/view/live/server_thread.hpp"
 #include "tests/tools/view/replay/packed_run.hpp"
+#include "tools/view/replay/shown_recording.hpp"
 #include "tools/view/run_description.hpp"
 
 namespace sls::view {
@@ -320,6 +322,50 @@ TEST_F(RecordedRunTest, DamageIsNamedInOneLine) {
                    [](const fs::path& file) { write_bytes(file, std::string(1 << 20, '#')); })
                 .find("expected at most 32768 bytes"),
             std::string::npos);
+}
+
+class ShownRecordingTest : public RecordedRunTest {
+ protected:
+  /// The steps of the recording of `run_id` in `folder`, or why there are none.
+  std::string ask(const fs::path& folder, std::uint64_t run_id, bool is_over = false) {
+    sls::test::ServerThread thread;
+    ShownRecording shown(folder, thread.post());
+    std::string answer;
+    int answers = 0;
+    const auto note = [&](bool is_there, const auto& bytes) {
+      answer = is_there ? std::to_string(unpack(*bytes).vehicles.at(0).times.size()) : *bytes;
+      ++answers;
+    };
+    for (int i = 0; i < 3; ++i) shown.ask(run_id, is_over, note);
+    EXPECT_TRUE(thread.wait_until([&] { return answers == 3 && shown.is_idle(); }));
+    return answer;
+  }
+};
+
+TEST_F(ShownRecordingTest, IsFoundByItsRunOrTheReasonIsNamed) {
+  constexpr std::uint64_t kRun = 0x0123456789abcdef;
+  const fs::path flight = record();
+  edit(record("another") / "manifest.json", "0123456789abcdef", "00000000000000aa");
+  write_bytes(record("damaged") / "manifest.json", "{");
+  const std::string all = std::to_string(kLastStep + 1);
+  EXPECT_EQ(ask(flight, kRun), all);
+  EXPECT_EQ(ask(folder_.path(), kRun, true), all);
+  const std::string wanted = ": expected the recording of run 0123456789abcdef, ";
+  for (const auto& [folder, problem] : {std::pair(folder_ / "another", "got none"),
+                                        std::pair(folder_ / "none", "No such file or directory"),
+                                        std::pair(fs::path("/dev/null"), "Not a directory")})
+    EXPECT_EQ(ask(folder, kRun), folder.string() + wanted + problem);
+  fs::remove(flight / "state.csv");
+  EXPECT_NE(ask(flight, kRun).find("state.csv"), std::string::npos);
+}
+
+TEST_F(ShownRecordingTest, OfARunThatGoesOnHasTheStepsUntilNow) {
+  const fs::path folder = folder_ / "flight";
+  fs::create_directory(folder);
+  record::Recording recording(folder, record::test::make_parameters());
+  record::test::add_steps(recording, 0, 99);
+  while (read_bytes(folder / "state.csv").size() < 9'000) recording.flush_if_due();
+  EXPECT_EQ(ask(folder_.path(), 0x0123456789abcdef), "100");
 }
 
 TEST_F(RecordedRunTest, AFolderOfAnotherKindIsRefused) {

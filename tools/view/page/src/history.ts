@@ -13,7 +13,7 @@ export class History {
   private readonly tracks = new Map<number, Track>();
   private readonly columns: Columns;
   readonly events: FlightEvent[] = [];
-  private readonly stages: { vehicle: number; sim_time_s: number; name: string }[] = [];
+  private stages: { vehicle: number; sim_time_s: number; name: string }[] = [];
   private count = 0;
 
   constructor(readonly run: Run) {
@@ -44,6 +44,27 @@ export class History {
         if (this.columns.find(name) >= 0) row.set(numbers, this.columns.find(name));
       this.add(vehicleId, time, row);
     }
+  }
+
+  /** Adds the rows of the run's recording. The end of a file that is being written may lack answers. */
+  addPast(past: Recording): void {
+    const isAnswered = (row: Float32Array) => Number.isFinite(row[this.columns.find("ref_x_m")]);
+    const toStep = (time: number) => Math.round(time / this.run.period_s);
+    for (const { id } of this.run.vehicles) {
+      const { time: times = [], rows = [] } = this.tracks.get(id) ?? {};
+      const steps = new Map(times.map((time, index) => [toStep(time), { time, row: rows[index]! }]));
+      const { time = [], values, columns = 0 } = past.rowsAs(this.columns, id) ?? {};
+      time.forEach((at, index) => {
+        const row = values!.subarray(index * columns, (index + 1) * columns);
+        const received = steps.get(toStep(at))?.row;
+        if (!received || isAnswered(row) || !isAnswered(received)) steps.set(toStep(at), { time: at, row });
+      });
+      const all = [...steps.values()].sort((a, b) => a.time - b.time);
+      this.tracks.set(id, { time: all.map(({ time: at }) => at), rows: all.map(({ row }) => row) });
+      this.count += (all.length - times.length) * this.columns.count;
+    }
+    while (this.count > kMostNumbers) this.thin();
+    this.stages = [...past.head.stage_starts, ...this.stages.filter(({ sim_time_s }) => sim_time_s > past.to)];
   }
 
   /** Null if nothing has been received. */

@@ -6,7 +6,9 @@ import {
   addEvent, clearEvents, showBanner, showEmpty, showLink, showPhase, showRun, showStage, showStatus, showTime, type Latency,
 } from "./panels";
 import { readKind, readPoses, readRows, type Poses } from "./protocol";
-import { Replay } from "./replay/replay";
+import { loadRecording } from "./replay/load";
+import type { Recording } from "./replay/recording";
+import { makeTrail, Replay } from "./replay/replay";
 import { makeShell, type Shell } from "./shell";
 import type { FlightEvent, Hello, Mark, NoRun, Reply, Run, Status } from "./types";
 
@@ -16,6 +18,7 @@ const kPanelTime = 250;
 const kMostLatencies = 1000;
 const kMostMarks = 300;
 const kEndTime = 1000; // ms after a run has ended, in which its last rows come
+const kFlushTime = 1000; // ms in which a recorder writes what it has
 
 type Message =
   | ({ op: "hello" } & Hello)
@@ -52,7 +55,11 @@ class Live {
   private readonly measured: number[] = [];
   private history: History | null = null;
   private panels = 0;
+  private isEnding = false; // the run has ended, and its recording has been asked for
   private isOver = false; // the page is a replay
+  /** What must come before what was flown until then is read from the recording. */
+  private awaited: "status" | "rows" | "nothing" = "status";
+  private missing = ""; // why it cannot be read
 
   constructor(private readonly shell: Shell) {
     this.bar = new OperatorBar(
@@ -63,8 +70,7 @@ class Live {
       },
     );
     shell.onSelect((vehicleId) => {
-      if (this.run) shell.plots.setRun(this.run);
-      shell.plots.setMarks(this.marks);
+      this.showRows();
       this.send({ op: "select", vehicle_id: vehicleId });
     });
     shell.scene?.onDrawn(() => this.noteFrame());
@@ -87,6 +93,7 @@ class Live {
     this.socket = socket;
     socket.onopen = () => {
       this.wait = kFirstWait;
+      this.awaited = "status";
       showLink("open", "connected");
       if (!this.isOver) showBanner(null);
       if (this.token) this.send({ op: "authenticate", token: this.token });
@@ -99,8 +106,8 @@ class Live {
   private noteLost(socket: WebSocket, reason: string): void {
     if (socket !== this.socket) return;
     this.socket = null;
-    if (this.hasEnded()) this.becomeReplay();
-    if (this.isOver) return void setTimeout(() => this.retry(), kMostWait);
+    if (this.hasEnded()) void this.end();
+    if (this.isOver || this.isEnding) return void setTimeout(() => this.retry(), kMostWait);
     showLink("lost", "not connected");
     const why = reason ? ` (${reason})` : "";
     const kept = this.run ? " The picture is the last one that came." : "";
@@ -122,11 +129,22 @@ class Live {
     return this.history !== null && /finished|failed/.test(this.status?.phase ?? "");
   }
 
-  /** Shows what has come of a run that has ended. The next run is shown live, by a fresh page. */
-  private becomeReplay(): void {
+  /** Waits for the last rows and the recording of a run that has ended. */
+  private async end(): Promise<void> {
+    if (this.isEnding) return;
+    this.isEnding = true;
+    const { run } = this;
+    const [past] = await Promise.all([this.loadPast(), new Promise((resolve) => setTimeout(resolve, kEndTime))]);
+    if (run === this.run && this.hasEnded()) this.becomeReplay(past);
+  }
+
+  /** Shows a run that has ended: its recording, or what has come. The next run is shown live, by a fresh page. */
+  private becomeReplay(past: Recording | null): void {
     if (this.isOver) return;
     const { phase, reason, step } = this.status!;
-    const recording = this.history!.toRecording(reason ? `${phase}: ${reason}` : phase, step);
+    const isWhole = past !== null && !(this.newest && this.newest.simTime > past.to + this.run!.period_s / 2);
+    if (past && !isWhole) this.history!.addPast(past);
+    const recording = isWhole ? past : this.history!.toRecording(reason ? `${phase}: ${reason}` : phase, step);
     if (!recording) return;
     this.isOver = true;
     clearInterval(this.panels);
@@ -135,7 +153,51 @@ class Live {
     find("bar").replaceChildren();
     find("link").hidden = true;
     new Replay(this.shell, [recording]);
-    showBanner(`The flight has ended. This replay has what the page received; ./sls view DIR shows the whole recording.`, "note");
+    const name = past?.head.name ?? "DIR";
+    const folder = /^[\w./+:@-]+$/.test(name) ? name : `'${name.replaceAll("'", "'\\''")}'`;
+    const source = isWhole ? "its recording" : `what the page received (${past ? "its recording ends earlier" : this.missing})`;
+    showBanner(`The flight has ended. This is ${source}; ./sls view ${folder} shows the recording again.`, "note");
+  }
+
+  /** The recording of the run, as far as it is written; null: `missing` says why. */
+  private async loadPast(): Promise<Recording | null> {
+    const id = this.run!.run_id;
+    try {
+      const past = await loadRecording("/history");
+      if (past.run.run_id !== id) throw new Error(`expected the recording of run ${id}, got that of ${past.run.run_id}`);
+      this.missing = "";
+      return past;
+    } catch (error) {
+      this.missing = (error as Error).message;
+      return null;
+    }
+  }
+
+  private async askForPast(): Promise<void> {
+    const { history } = this;
+    const past = await this.loadPast();
+    if (past && history === this.history && !this.isEnding) this.addPast(past);
+  }
+
+  private addPast(past: Recording): void {
+    const { run_id, period_s } = this.run!;
+    this.history!.addPast(past);
+    const flown = this.showRows()!;
+    for (const id of flown.vehicleIds) this.shell.scene?.setTrail(id, makeTrail(flown, id, flown.to));
+    if (!(this.newest && this.newest.simTime > flown.to - period_s / 2))
+      this.receivePoses({
+        runId: run_id, step: Math.round(flown.to / period_s), simTime: flown.to, publishedMs: NaN, poses: flown.posesAt(flown.to) });
+  }
+
+  /** Plots what has been flown; null: nothing. */
+  private showRows(): Recording | null {
+    const { plots } = this.shell;
+    const flown = this.history?.toRecording("", 0) ?? null;
+    if (this.run) plots.setRun(this.run);
+    const rows = flown?.rowsOf(this.shell.selected());
+    if (rows) plots.replace(rows);
+    plots.setMarks(this.marks);
+    return flown;
   }
 
   private receive(data: string | ArrayBuffer): void {
@@ -168,7 +230,11 @@ class Live {
         this.status = { ...message, phase: message.phase.toLowerCase() };
         this.bar.setPhase(this.status.phase, this.status.step, true);
         this.history?.addStage(this.status);
-        if (this.hasEnded()) setTimeout(() => this.hasEnded() && this.becomeReplay(), kEndTime);
+        if (this.hasEnded()) void this.end();
+        else if (this.awaited === "status" && this.run) {
+          this.awaited = this.status.step > 0 ? "rows" : "nothing";
+          if (this.status.step > 0) void this.askForPast();
+        }
         break;
       case "event":
         this.noteEvent(message);
@@ -185,6 +251,9 @@ class Live {
     if (this.run?.run_id === run.run_id) return; // the same run after a reconnection
     this.run = run;
     this.history = new History(run);
+    this.isEnding = false;
+    this.missing = "";
+    this.awaited = "status";
     this.status = null;
     this.newest = null;
     this.marks = [];
@@ -233,6 +302,9 @@ class Live {
     if (rows.runId !== this.run?.run_id || rows.vehicleId !== this.shell.selected()) return;
     this.history?.addRows(rows);
     this.shell.plots.append(rows);
+    if (this.awaited !== "rows") return;
+    this.awaited = "nothing";
+    setTimeout(() => void this.askForPast(), kFlushTime);
   }
 
   /** Measures the latency up to a message through a channel, which arrives after layout and paint of the frame. */
@@ -240,6 +312,7 @@ class Live {
     if (!this.newest || this.newest.step === this.drawnStep) return;
     this.drawnStep = this.newest.step;
     showTime(this.newest.simTime);
+    if (Number.isNaN(this.newest.publishedMs)) return; // of the recording
     this.measured.push(this.newest.publishedMs);
     this.channel.port2.postMessage(0);
   }
@@ -263,7 +336,7 @@ class Live {
     const stages = this.run?.stages ?? [];
     const stage = this.status.stage || (stages.length === 1 ? stages[0]! : "");
     showStage(stage, stages.indexOf(stage), stages.length);
-    showStatus(this.status, this.run, this.calcLatency(), this.shell.scene?.fps() ?? 0);
+    showStatus(this.status, this.run, this.calcLatency(), this.shell.scene?.fps() ?? 0, this.missing && `not shown: ${this.missing}`);
   }
 
   private getState() {

@@ -91,7 +91,8 @@ export function showLines(lines: readonly Line[]): void {
   });
 }
 
-export function showStatus(status: Status, run: Run | null, drawn: Latency, fps: number): void {
+/** `missing`: why the page does not show the steps before it was opened, or empty. */
+export function showStatus(status: Status, run: Run | null, drawn: Latency, fps: number, missing: string): void {
   showPhase(status.phase);
   const lines: Line[] = [];
   const add = (name: string, text: string, kind?: "warn" | "bad") => {
@@ -104,6 +105,7 @@ export function showStatus(status: Status, run: Run | null, drawn: Latency, fps:
   const period = run ? `, period ${+(run.period_s * 1000).toPrecision(4)} ms` : "";
   add("Step", `${format(status.step)}${run ? ` · ${run.mode}${period}` : ""}`);
   const wanted = run && run.real_time_factor > 0 ? ` (target ${run.real_time_factor})` : "";
+  add("Earlier steps", missing);
   add("Real-time factor", status.real_time_factor > 0 ? `${status.real_time_factor.toFixed(3)}${wanted}` : "");
   add("Timing", status.timing);
   add("Controller", status.controller);

@@ -74,6 +74,9 @@ export class Plots {
     this.touch();
   }
 
+  /** Of the samples, s. */
+  times = (): number[] => Array.from(this.samples[0].time.subarray(0, this.samples[0].count));
+
   /** Sets the time that the scene shows; null: the newest. */
   setCursor(time: number | null): void {
     this.cursor = time;

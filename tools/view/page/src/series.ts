@@ -50,7 +50,9 @@ export function describePlots(run: Run): PlotDescription[] {
     ]);
   }
   add("rod", run.load ? "Cable angles" : "Rod angles", "°", [...plain("alpha_rad", "α", kDegrees), ...plain("beta_rad", "β", kDegrees)]);
-  add("force", "Force", "N", ["x", "y", "z"].flatMap((axis) => plain(`force_${axis}_n`, axis)));
+  // What is far from zero, such as a weight or a turn, would flatten what varies about it.
+  add("force", "Force x, y", "N", ["x", "y"].flatMap((axis) => plain(`force_${axis}_n`, axis)));
+  add("force_z", "Force z", "N", plain("force_z_n", "z"));
   const attitude = (prefix: string): Series[] => {
     const places = ["w", "x", "y", "z"].map((axis) => columns.find(`${prefix}${axis}`));
     if (!places.every((place) => place >= 0)) return [];
@@ -60,8 +62,12 @@ export function describePlots(run: Run): PlotDescription[] {
       calc: (row: Float32Array) => calcEuler(row[w]!, row[x]!, row[y]!, row[z]!)[index]! * kDegrees,
     }));
   };
-  if (run.has_attitude) add("attitude", "Attitude", "°", attitude("att_"));
-  if (run.load && run.load.outline_m.length > 0) add("load_attitude", "Load attitude", "°", attitude("load_att_"));
+  const addAttitude = (prefix: string, title: string) => {
+    add(prefix, `${title}: roll, pitch`, "°", attitude(prefix).slice(0, 2));
+    add(`${prefix}yaw`, `${title}: yaw`, "°", attitude(prefix).slice(2));
+  };
+  if (run.has_attitude) addAttitude("att_", "Attitude");
+  if (run.load && run.load.outline_m.length > 0) addAttitude("load_att_", "Load attitude");
   const rotors = run.columns.filter(({ name }) => /^rotor_\d+_rad_s$/.test(name));
   add("rotors", "Rotors", "rad/s", rotors.slice(0, 8).flatMap(({ name }) => plain(name, name.split("_")[1]!)));
   add("speed", "Load velocity", "m/s", ["x", "y", "z"].flatMap((axis) => plain(`load_v${axis}_m_s`, axis)));

@@ -108,6 +108,7 @@ export function makeShell(): Shell {
           projection: (vehicleId: number) => scene?.projection(vehicleId) ?? null,
           camera: () => scene?.camera() ?? null,
           cable: (vehicleId: number) => scene?.cable(vehicleId) ?? null,
+          plotted: () => plots.times(),
           /** Of the newest step, frame W. */
           pose: (vehicleId: number) => {
             const pose = newest.find((candidate) => candidate.vehicleId === vehicleId);

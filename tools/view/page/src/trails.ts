@@ -94,6 +94,7 @@ export class Trails {
     this.positions.clearUpdateRanges();
     this.positions.needsUpdate = true;
     this.filled = this.slots;
+    this.next = Math.max(0, Math.min(points - 1, this.slots)) % this.slots;
     this.lines.geometry.setDrawRange(0, Infinity);
     this.lastTime = NaN;
   }

@@ -19,6 +19,7 @@ async function fetchBytes(address: string): Promise<ArrayBuffer> {
     throw new Error(`${address}: expected a recording, got no answer from sls_view; is it still running?`);
   }
   if (!response.ok) throw new Error(`${address}: expected a recording, got HTTP status ${response.status}`);
+  if (/^text/.test(response.headers.get("Content-Type") ?? "")) throw new Error((await response.text()).trim());
   return response.arrayBuffer();
 }
 

@@ -241,7 +241,7 @@ function describeFault({ kind, on }: RecordedFault): string {
 }
 
 /** Trail of the flight until `time`. */
-function makeTrail(recording: Recording, vehicleId: number, time: number): Trail {
+export function makeTrail(recording: Recording, vehicleId: number, time: number): Trail {
   const rows = recording.rowsOf(vehicleId)!;
   const last = findRow(rows.time, time);
   const stride = Math.max(1, Math.round(kTrailSpacing / recording.spacing));
