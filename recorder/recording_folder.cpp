@@ -98,10 +98,14 @@ void remove_recording(const std::string& place, const fs::path& folder) {
   }
 }
 
+constexpr std::uintmax_t kLongestHeader = 1 << 20;  // as CsvReader
+
 /// True if state.csv has no row: the recorder was killed after it had created the files.
 bool is_without_rows(const fs::path& folder) {
   std::error_code error;
-  if (!fs::is_regular_file(folder / StateRow::kFile, error)) return false;
+  if (!fs::is_regular_file(folder / StateRow::kFile, error) ||
+      fs::file_size(folder / StateRow::kFile, error) > kLongestHeader)
+    return false;
   std::ifstream file(folder / StateRow::kFile);
   std::string header;
   return file && (!std::getline(file, header) || file.peek() == std::ifstream::traits_type::eof());

@@ -27,9 +27,14 @@ ManifestFile::File measure(const fs::path& path) {
   text::Sha256 hash;
   std::uint64_t lines = 0;
   bool is_quoted = false;
-  std::array<char, 1 << 16> block;
+  using Block = std::array<char, 1 << 16>;
+  static const Block zeros = {};
+  Block block;
   while (stream.read(block.data(), block.size()) || stream.gcount() > 0) {
     const std::string_view bytes(block.data(), static_cast<std::size_t>(stream.gcount()));
+    // A hole in a file, which may be larger than any disk.
+    if (bytes.size() == block.size() && block == zeros)
+      throw DamagedError(path.string() + ": expected data, got zeros");
     hash.add(bytes);
     for (const char letter : bytes) {
       is_quoted = is_quoted != (letter == '"');

@@ -37,6 +37,7 @@ using Stream = std::unique_ptr<BIO, Deleter<BIO, BIO_free_all>>;
 
 constexpr const char* kAuthentication = "dds.sec.auth.builtin.PKI-DH.";
 constexpr const char* kAccess = "dds.sec.access.builtin.Access-Permissions.";
+constexpr std::uintmax_t kMostBytes = 1 << 20;
 
 [[noreturn]] void fail(const std::string& file, const std::string& what) {
   throw ConfigError(file + ": " + what);
@@ -72,6 +73,9 @@ std::string find_file(const std::map<std::string, std::string>& properties,
   return found->second.substr(scheme.size());
 }
 
+/// Called for an encrypted file: otherwise openssl asks the terminal, and the program waits.
+int refuse_password(char*, int, int, void*) { return -1; }
+
 Stream open(const std::string& file) {
   std::error_code error;
   if (!std::filesystem::exists(file, error))
@@ -79,6 +83,8 @@ Stream open(const std::string& file) {
                    (error ? error.message() : std::string("no such file")));
   if (!std::filesystem::is_regular_file(file, error))
     fail(file, "expected a file, got another kind");
+  if (const auto size = std::filesystem::file_size(file, error); size > kMostBytes)
+    fail(file, fmt::format("expected at most {} bytes, got {}", kMostBytes, size));
   Stream stream(BIO_new_file(file.c_str(), "r"));
   if (!stream) fail(file, "expected a readable file, got " + find_openssl_error());
   return stream;
@@ -86,7 +92,7 @@ Stream open(const std::string& file) {
 
 Certificate read_certificate(const std::string& file) {
   const Stream stream = open(file);
-  Certificate certificate(PEM_read_bio_X509(stream.get(), nullptr, nullptr, nullptr));
+  Certificate certificate(PEM_read_bio_X509(stream.get(), nullptr, refuse_password, nullptr));
   if (!certificate) fail(file, "expected a certificate (PEM), got " + find_openssl_error());
   return certificate;
 }
@@ -123,8 +129,9 @@ void check_key(const std::string& file, X509& certificate, const std::string& ce
   const auto mode = static_cast<unsigned>(std::filesystem::status(file).permissions());
   if ((mode & 077) != 0)
     fail(file, fmt::format("expected mode 0600 or stricter, got {:04o}", mode & 07777));
-  const Key key(PEM_read_bio_PrivateKey(stream.get(), nullptr, nullptr, nullptr));
-  if (!key) fail(file, "expected a private key (PEM), got " + find_openssl_error());
+  const Key key(PEM_read_bio_PrivateKey(stream.get(), nullptr, refuse_password, nullptr));
+  if (!key)
+    fail(file, "expected a private key (PEM) without a password, got " + find_openssl_error());
   if (X509_check_private_key(&certificate, key.get()) != 1)
     fail(file, "expected the private key of " + certificate_file + ", got another");
 }

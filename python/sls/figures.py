@@ -6,6 +6,7 @@ Times are simulation time. Angles are drawn in degrees. Only `to_z_up` leaves fr
 import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +43,7 @@ METADATA = {"png": {"Software": None}, "svg": {"Date": None, "Creator": None},
 
 # Most points of all vehicles together, and about the most of a line. More points would only make the file larger.
 FLEET_POINTS, LINE_POINTS = 100_000, 40_000
+MOST_DRAWN = 1e30  # axes compute with squares of the numbers, so that larger ones end in errors of matplotlib
 
 
 def to_z_up(positions: np.ndarray) -> np.ndarray:
@@ -501,12 +503,22 @@ FIGURES: dict[str, Callable[[Sequence[Trajectory]], Figure]] = {
 }
 
 
+def leave_out_extremes(value: Any) -> Any:
+    """A flight, or one of its parts, with NaN for numbers beyond MOST_DRAWN."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return replace(value, **{field.name: leave_out_extremes(getattr(value, field.name)) for field in fields(value)})
+    if isinstance(value, np.ndarray) and value.dtype.kind == "f" and np.any(is_beyond := np.abs(value) > MOST_DRAWN):
+        return np.where(is_beyond, np.nan, value)
+    return value
+
+
 def make_figures(flights: Sequence[Trajectory], fleet: Sequence[Trajectory] = (), paper: float | None = None,
                  panels: Mapping[str, Sequence[int]] | None = None) -> dict[str, Figure]:
     """All figures for which these flights have data, by name. The overview of a `fleet` comes first. A flight of one
     state has no line to draw, and is left out. `panels`: the figures to draw, each with its panels; `paper` and panels
     as of `lay_out`. Raises InputError if there is no such figure or panel."""
-    flights = [flight for flight in flights if len(flight.time_s) > 1]
+    flights = [leave_out_extremes(flight) for flight in flights if len(flight.time_s) > 1]
+    fleet = [leave_out_extremes(flight) for flight in fleet]
     plots: dict[str, Callable[[Sequence[Trajectory]], Figure]] = {}
     if flights:
         plots = FIGURES

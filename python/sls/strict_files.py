@@ -17,11 +17,12 @@ NAMES = {bool: "true or false", str: "a text", float: "a finite number", dict: "
 def open_regular(file: Path) -> BinaryIO:
     """Opens a regular file for reading. Raises OSError; also for a pipe, a socket or a device, because its reader
     could wait, or read, for ever."""
-    stream = os.fdopen(os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC), "rb")
-    if stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
-        return stream
-    stream.close()
-    raise OSError(0, "a pipe, socket or device")
+    descriptor = os.open(file, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+    mode = os.fstat(descriptor).st_mode
+    if stat.S_ISREG(mode):
+        return os.fdopen(descriptor, "rb")
+    os.close(descriptor)  # os.fdopen would refuse a folder and leave it open
+    raise OSError(0, "a directory" if stat.S_ISDIR(mode) else "a pipe, socket or device")
 
 
 def read_limited(file: Path, most: int = MOST_BYTES) -> bytes:

@@ -1,6 +1,7 @@
 """Reads recordings that this test writes in the recorder's format: complete, cut short, in segments, of
 fleets."""
 
+import io
 import json
 import shutil
 
@@ -13,6 +14,13 @@ from sls.input_error import InputError
 from sls.metrics import calc_stage_metrics
 from sls.recordings import Recording
 from support import PERIOD_S, STEPS_PER_STAGE, load_of, reference_of, write_recording
+
+
+def replace_field(text, line, column, number):
+    """The text of a table with another number in one of its lines, counted from 0."""
+    rows = [row.split(",") for row in text.split("\n")]
+    rows[line][rows[0].index(column)] = number
+    return "\n".join(map(",".join, rows))
 
 
 class RecordingsTest(support.FolderTest):
@@ -85,6 +93,13 @@ class RecordingsTest(support.FolderTest):
         # The attitude that realises its force is still known.
         figure = make_figures([flight])["body_attitude"]
         self.assertEqual([len(axes.lines) for axes in figure.axes], [2, 2, 2])
+
+    def test_figures_leave_out_numbers_that_no_axis_can_show(self):
+        write_recording(self.folder / "r", last=30)
+        for name, of, number in (("state.csv", "load_x_m", "-1e155"), ("command.csv", "force_y_n", "1e308")):
+            self.change(name, lambda text, of=of, number=number: replace_field(text, 20, of, number))
+        for figure in make_figures([self.load()], panels={"forces": [], "path": []}).values():
+            figure.savefig(io.BytesIO(), format="svg")
 
     def test_the_attitude_that_realises_a_force_turns_the_thrust_into_it(self):
         write_recording(self.folder / "r", last=3)

@@ -206,6 +206,9 @@ TEST_F(ResumeTest, AFolderThatIsNoRecordingIsRefusedAndKept) {
   write_bytes(out_ / "state.csv", std::string(1000, 'x') + "\nx");
   EXPECT_NE(find_resume_error().find("expected an empty folder"), std::string::npos);
   EXPECT_TRUE(fs::exists(out_ / "state.csv"));
+  write_bytes(out_ / "state.csv", "");
+  fs::resize_file(out_ / "state.csv", std::uintmax_t{1} << 40);  // one line of 1 TiB
+  EXPECT_NE(find_resume_error().find("expected an empty folder"), std::string::npos);
   fs::remove(out_ / "state.csv");
   ASSERT_EQ(::mkfifo((out_ / "state.csv").c_str(), 0600), 0);
   EXPECT_NE(find_resume_error().find("expected an empty folder"), std::string::npos);

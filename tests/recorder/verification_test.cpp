@@ -393,6 +393,9 @@ TEST_F(VerificationTest, APipeOrADeviceInThePlaceOfAFileIsAProblem) {
               std::string::npos)
         << file;
   }
+  write_bytes(a_ / "flight.txt", "");
+  fs::resize_file(a_ / "flight.txt", std::uintmax_t{1} << 40);  // reading it would take minutes
+  EXPECT_NE(find_problems(a_).find("flight.txt: expected data, got zeros"), std::string::npos);
   fs::rename(b_ / "status.csv", b_ / "manifest.json");
   const auto find = [&] {
     return sls::test::find_error<config::ConfigError>([&] { open_recording(b_); });

@@ -103,8 +103,17 @@ TEST_F(BadKeysTest, AFileThatIsSomethingElse) {
     const std::string content = read_bytes(file(name));
     write_bytes(file(name), "something else\n");
     expect_refused(keys_.as(), file(name).string() + ": expected ");
+    fs::resize_file(file(name), std::uintmax_t{1} << 40);
+    expect_refused(keys_.as(), file(name).string() + ": expected at most 1048576 bytes, got ");
     write_bytes(file(name), content);
   }
+}
+
+TEST_F(BadKeysTest, AnEncryptedKeyAsksForNoPassword) {
+  expect_exit({"openssl", "ec", "-aes256", "-passout", "pass:secret", "-in", file("key.pem"),
+               "-out", file("key.pem")});
+  expect_refused(keys_.as(), "sim_server: error: " + file("key.pem").string() +
+                                 ": expected a private key (PEM) without a password, got ");
 }
 
 TEST_F(BadKeysTest, AFileOfOtherKeys) {

@@ -14,6 +14,7 @@ namespace {
 namespace fs = std::filesystem;
 using record::CsvReader;
 
+constexpr std::uintmax_t kMostLogBytes = 64 << 20;
 constexpr std::size_t kMostLineBytes = 4096;  // of flight.txt; the recorder writes shorter lines
 
 double to_time(std::uint64_t step, double period_s) { return static_cast<double>(step) * period_s; }
@@ -52,7 +53,9 @@ void read_flight_log(const fs::path& folder, double period_s, std::vector<Record
   std::set<std::pair<std::uint64_t, std::string>> known;
   for (const RecordedEvent& event : events) known.emplace(event.step, event.text);
   std::error_code error;
-  if (!fs::is_regular_file(folder / "flight.txt", error)) return;
+  if (!fs::is_regular_file(folder / "flight.txt", error) ||
+      fs::file_size(folder / "flight.txt", error) > kMostLogBytes)
+    return;
   std::ifstream stream(folder / "flight.txt", std::ios::binary);
   bool is_event = false;
   std::string line;

@@ -298,6 +298,8 @@ TEST_F(RecordedRunTest, DamageIsNamedInOneLine) {
   EXPECT_EQ(damage("flight.txt",
                    [](const fs::path& file) { fs::remove(file), ::mkfifo(file.c_str(), 0600); }),
             "none");
+  const auto extend = [](const fs::path& file) { fs::resize_file(file, std::uintmax_t{1} << 40); };
+  EXPECT_EQ(damage("flight.txt", extend), "none");
   EXPECT_NE(damage("state.csv",
                    [](const fs::path& file) {
                      const std::string bytes = read_bytes(file);
