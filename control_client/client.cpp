@@ -60,6 +60,7 @@ std::unique_ptr<AnswerStream> Client::make_stream(bool is_realtime) {
 
 void Client::run() {
   announcer_.announce(core_.make_announcement());
+  const app::LookedAfter until_the_end;
   for (act(look()); core_.phase() != ClientCore::Phase::kEnded; act(look())) {
     announcer_.repeat_if_due();
     app::sleep_until(core_.next_deadline());

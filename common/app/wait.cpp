@@ -2,8 +2,8 @@
 
 #include <spdlog/spdlog.h>
 
+#include <atomic>
 #include <thread>
-#include <utility>
 
 namespace sls::app {
 
@@ -19,11 +19,12 @@ void sleep_for(sync::Duration duration) { sleep_until(sync::awake_clock().now() 
 
 void log_stop() {
   constexpr auto kWorthALine = std::chrono::milliseconds(500);
-  static sync::Duration logged{0};
+  static std::atomic<sync::Duration> logged{sync::Duration(0)};
   const sync::Duration stopped = sync::awake_clock().stopped();
-  if (stopped - logged < kWorthALine) return;
-  spdlog::warn("this program was stopped for {:.1f} s, which counts as nobody's silence",
-               sync::to_seconds(stopped - std::exchange(logged, stopped)));
+  sync::Duration before = logged;
+  if (stopped - before >= kWorthALine && logged.compare_exchange_strong(before, stopped))
+    spdlog::warn("this program was stopped for {:.1f} s, which counts as nobody's silence",
+                 sync::to_seconds(stopped - before));
 }
 
 }  // namespace sls::app

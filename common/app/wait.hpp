@@ -18,6 +18,10 @@ inline constexpr auto kShortPollTime = std::chrono::milliseconds(5);
 void sleep_until(sync::Time due);
 /// As sleep_until, for `duration`.
 void sleep_for(sync::Duration duration);
+/// Ends with a loop that sleeps by sleep_until, in a process that does other things afterwards.
+struct LookedAfter {
+  ~LookedAfter() { sync::awake_clock().expect_no_look(); }
+};
 /// Logs for how long the program was stopped since the last call, if it was.
 void log_stop();
 

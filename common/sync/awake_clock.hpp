@@ -43,6 +43,9 @@ class AwakeClock {
   /// The next look of the main thread is at `due`, of awake time.
   void expect_look(Time due) { due_ = (due + stopped()).time_since_epoch().count(); }
 
+  /// The main thread looks no more: from now on this is steady time.
+  void expect_no_look() { due_ = Duration::max().count(); }
+
   /// `awake` as a time of the steady clock, unless the program is stopped until then.
   Time to_steady(Time awake) const { return awake + stopped(); }
 
