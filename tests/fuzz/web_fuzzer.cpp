@@ -53,8 +53,9 @@ std::unique_ptr<view::Hub> make_hub() {
   limits.message_bytes = 4'096;
   limits.queue_bytes = 16'384;
   auto hub = std::make_unique<view::Hub>(access, limits);
-  hub->resources["/"] = {"text/html", test::make_payload("the page"), test::make_payload("zipped"),
-                         "default-src *"};
+  const view::Resource page{"text/html", test::make_payload("the page"),
+                            test::make_payload("zipped"), "default-src *"};
+  hub->resources["/"] = [page](const auto& done) { done(page); };
   add_protocols(*hub);
   return hub;
 }
