@@ -8,7 +8,8 @@ import { waitFor } from "./page/browser.mjs";
 
 export const root = fileURLToPath(new URL("../../..", import.meta.url));
 const bin = join(process.env.SLS_BUILD ?? join(root, "build"), "bin");
-const kHoldDomain = "import own_domain, sys\nwith own_domain.OwnDomain() as domain:\n    print(domain, flush=True)\n    sys.stdin.read()";
+const kHoldDomain = "import sys\nsys.path.append('../../python')\nimport own_domain\n" +
+  "with own_domain.own_domain() as domain:\n    print(domain, flush=True)\n    sys.stdin.read()";
 
 /**
  * Flies the shipped scenario `base` with `change`. `hasFlight` false: only reserves the domain.
