@@ -78,7 +78,7 @@ void Client::act(ClientCore::Act act) {
 ClientCore::Act Client::look() {
   if (answerer_) rethrow_answer_error();
   servers_.look_for_impostors();
-  const ClientCore::Now now{sync::awake_clock().now(), options_.is_stopped(),
+  const ClientCore::Now now{app::awake_clock().now(), options_.is_stopped(),
                             answerer_ && stream_->sees_server(answerer_->run().server)};
   const auto act =
       servers_.ask([&](const sync::Servers& servers) { return core_.look(servers, now); });

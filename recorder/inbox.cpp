@@ -33,7 +33,7 @@ bool Inbox::empty_into(Recording& recording) {
     const std::lock_guard lock(mutex_);
     samples = arrivals_.take_all();
   }
-  const auto now = sync::awake_clock().now();
+  const auto now = app::awake_clock().now();
   for (const Arrivals::Sample& sample : samples)
     if (const auto* batch = std::get_if<RecordBatch>(&sample))
       recording.add(*batch, now);

@@ -81,7 +81,7 @@ RecorderCore::Act Recorder::look() {
 
 RecorderCore::Now Recorder::look_around() const {
   RecorderCore::Now now;
-  now.time = sync::awake_clock().now();
+  now.time = app::awake_clock().now();
   now.interruption = app::describe_stop();
   if (!writing_) return now;
   now.is_closed = writing_->has_ended();  // first: the last step does not change after it

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
+#include "common/app/awake_clock.hpp"
 #include "common/bus/topics.hpp"
 #include "common/config/scenario.hpp"
-#include "common/sync/awake_clock.hpp"
 #include "recorder/certificate.hpp"
 #include "recorder/core/recorder_core.hpp"
 #include "recorder/core/recording_core.hpp"
@@ -31,7 +31,7 @@ class Recording final : private RecordingOutputs {
   /// @throws DamagedError if an earlier segment cannot be read.
   /// Every member @throws std::system_error with the name of the file if it cannot be written.
   Recording(const Segment& segment, const Parameters& parameters,
-            sync::Time now = sync::awake_clock().now());
+            sync::Time now = app::awake_clock().now());
   /// For a recording of one segment.
   Recording(const std::filesystem::path& folder, const Parameters& parameters);
 
@@ -44,7 +44,7 @@ class Recording final : private RecordingOutputs {
   }
   /// Flushes the files if the last flush is `record.flush_s` ago. After a time limit, a lost batch
   /// is no longer waited for.
-  void flush_if_due(sync::Time now = sync::awake_clock().now()) { core_.on_time(now); }
+  void flush_if_due(sync::Time now = app::awake_clock().now()) { core_.on_time(now); }
 
   /// True when the run has ended and its last batch has been handled.
   bool has_all() const { return core_.phase() == RecordingCore::Phase::kWhole; }

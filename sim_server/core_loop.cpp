@@ -8,7 +8,7 @@
 namespace sls::sim {
 namespace {
 
-sync::Time now() { return sync::awake_clock().now(); }
+sync::Time now() { return app::awake_clock().now(); }
 
 }  // namespace
 
@@ -55,10 +55,10 @@ bool CoreLoop::wait_until_due() {
     // Each step that the middleware's thread takes meanwhile moves the deadline.
     const sync::Time deadline = deadline_.load();
     sleeps_until_ = deadline;
-    sync::awake_clock().expect_look(deadline);
+    app::awake_clock().expect_look(deadline);
     const bool has_slack = is_lockstep_ && awaits_answers_;
     const auto slack = has_slack ? calc_slack(now() - unanswered_) : Clock::duration::zero();
-    if (backlog_.is_waiting() || commands_.wait(sync::awake_clock().to_steady(deadline + slack)))
+    if (backlog_.is_waiting() || commands_.wait(app::awake_clock().to_steady(deadline + slack)))
       return false;
   } while (now() < deadline_.load());
   return true;

@@ -5,10 +5,10 @@
 
 #include <utility>
 
+#include "common/app/awake_clock.hpp"
 #include "common/app/log.hpp"
 #include "common/app/scheduling.hpp"
 #include "common/bus/spinning.hpp"
-#include "common/sync/awake_clock.hpp"
 
 namespace sls::sim {
 
@@ -41,8 +41,8 @@ void Outbox::write_waiting() {
 void Outbox::write(const sync::Line& line) { app::log(line); }
 
 Moment Outbox::send_states(const Fleet& fleet) {
-  const Moment moment{sync::awake_clock().now(), std::chrono::system_clock::now(),
-                      sync::awake_clock().stopped()};
+  const Moment moment{app::awake_clock().now(), std::chrono::system_clock::now(),
+                      app::awake_clock().stopped()};
   endpoints_.states.write(fleet, [](std::size_t) { return true; });
   return moment;
 }

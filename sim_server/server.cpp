@@ -6,11 +6,11 @@
 #include <chrono>
 #include <utility>
 
+#include "common/app/awake_clock.hpp"
 #include "common/app/options.hpp"
 #include "common/app/run_main.hpp"
 #include "common/bus/spinning.hpp"
 #include "common/config/vehicle_ids.hpp"
-#include "common/sync/awake_clock.hpp"
 #include "sim_server/messages.hpp"
 
 namespace sls::sim {
@@ -54,7 +54,7 @@ void Server::run() {
       core = make_core({0, false, core->is_paused()});
     } catch (const std::exception& error) {
       // The ended run tells the participants that it has no successor.
-      core->on_failure(error.what(), sync::awake_clock().now());
+      core->on_failure(error.what(), app::awake_clock().now());
       loop_.write_waiting(*core);
       break;
     }
@@ -76,7 +76,7 @@ std::unique_ptr<ServerCore> Server::make_core(ServerCore::Start start) {
                                                       scenario, fleet->plant(), app::version()));
   log_run(scenario, assignment_.vehicle_ids, start.run_id);
   return std::make_unique<ServerCore>(scenario, start, std::move(fleet), outbox_,
-                                      sync::awake_clock().now());
+                                      app::awake_clock().now());
 }
 
 void Server::linger(const ServerCore& core) {
@@ -91,7 +91,7 @@ void Server::linger(const ServerCore& core) {
 void Server::fill(CommandSample& received, const Commands& sample,
                   const bus::PeerId& sender) const {
   received.sender = sender;
-  received.arrived = {sync::awake_clock().now(), std::chrono::system_clock::now()};
+  received.arrived = {app::awake_clock().now(), std::chrono::system_clock::now()};
   received.written = endpoints_.commands.written();
   sim::fill(received, sample);
 }

@@ -5,7 +5,7 @@
 #include <string>
 #include <utility>
 
-#include "common/sync/awake_clock.hpp"
+#include "common/app/awake_clock.hpp"
 #include "common/sync/membership.hpp"
 #include "common/sync/servers.hpp"
 #include "worlds/plan.hpp"
@@ -89,7 +89,7 @@ class Program {
   sync::Servers servers_;
   sync::Membership members_;
   std::string stop_signal_;
-  mutable sync::AwakeClock clock_;
+  mutable app::AwakeClock clock_;
 
  private:
   void look_for_unclaimed();

@@ -2,7 +2,7 @@
 
 #include <chrono>
 
-#include "common/sync/awake_clock.hpp"
+#include "common/app/awake_clock.hpp"
 #include "common/sync/patience.hpp"
 
 namespace sls::app {
@@ -20,7 +20,7 @@ void sleep_until(sync::Time due);
 void sleep_for(sync::Duration duration);
 /// Ends with a loop that sleeps by sleep_until, in a process that does other things afterwards.
 struct LookedAfter {
-  ~LookedAfter() { sync::awake_clock().expect_no_look(); }
+  ~LookedAfter() { app::awake_clock().expect_no_look(); }
 };
 /// Logs for how long the program was stopped since the last call, if it was.
 void log_stop();
@@ -39,7 +39,7 @@ class Wait {
   double seconds_left() const { return patience_.seconds_left(now()); }
 
  private:
-  static sync::Time now() { return sync::awake_clock().now(); }
+  static sync::Time now() { return app::awake_clock().now(); }
 
   sync::Patience patience_;
 };

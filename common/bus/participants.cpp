@@ -31,7 +31,7 @@ ParticipantDirectory::ParticipantDirectory(Node& node)
 
 void ParticipantDirectory::note(const Participant& sample, const PeerId& sender) {
   const auto written = reader_.written();
-  const sync::Membership::Arrival arrival{sync::awake_clock().now(), written,
+  const sync::Membership::Arrival arrival{app::awake_clock().now(), written,
                                           std::chrono::system_clock::now() - written};
   const auto present = reader_.matched();
   const std::lock_guard lock(mutex_);
@@ -72,22 +72,22 @@ int ParticipantDirectory::count_done(ParticipantRole role, std::uint64_t run_id)
 
 void Announcer::announce(const Participant& message) {
   last_ = message;
-  time_ = sync::awake_clock().now();
+  time_ = app::awake_clock().now();
   writer_.write(message);
 }
 
 void Announcer::repeat_if_due() {
-  if (last_ && sync::awake_clock().now() - time_ >= sync::kRepeatAfter)
+  if (last_ && app::awake_clock().now() - time_ >= sync::kRepeatAfter)
     announce(Participant(*last_));
 }
 
 void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
                                int expected, const sync::RecorderPatience& patience) {
-  sync::RecordersEnd end(sync::awake_clock().now(), expected, patience);
+  sync::RecordersEnd end(app::awake_clock().now(), expected, patience);
   while (true) {
     const auto recorders = participants.find(ParticipantRole::ROLE_RECORDER, run_id);
     const int done = participants.count_done(ParticipantRole::ROLE_RECORDER, run_id);
-    const auto now = sync::awake_clock().now();
+    const auto now = app::awake_clock().now();
     if (end.is_over(recorders, done, app::stop_signal() != 0, now)) return;
     if (const auto report = end.take_report(recorders, now)) spdlog::info("{}", *report);
     app::sleep_for(app::kShortPollTime);
@@ -124,9 +124,9 @@ bool ServerDirectory::note(const Sample& sample, const PeerId& sender) {
   servers_.set_present(present);
   bool is_taken = true;
   if constexpr (std::is_same_v<Sample, SimStatus>)
-    is_taken = servers_.note(sample, sender, sync::awake_clock().now());
+    is_taken = servers_.note(sample, sender, app::awake_clock().now());
   else
-    servers_.note(sample, sender, sync::awake_clock().now());
+    servers_.note(sample, sender, app::awake_clock().now());
   for (const auto& impostor : servers_.take_impostors())
     note_impostor(impostor.sender, impostor.topic, impostor.run_id, impostor.owner);
   return is_taken;
@@ -143,7 +143,7 @@ void ServerDirectory::note_impostor(const PeerId& sender, const char* topic, std
 
 void ServerDirectory::look_for_impostors() {
   constexpr auto kInterval = 100ms;
-  const auto now = sync::awake_clock().now();
+  const auto now = app::awake_clock().now();
   {
     const std::lock_guard lock(mutex_);
     if (now - impostors_looked_for_ < kInterval) return;
@@ -168,12 +168,12 @@ void ServerDirectory::look_for_impostors() {
 }
 
 std::vector<sync::Run> ServerDirectory::runs() const {
-  return ask([](const sync::Servers& servers) { return servers.runs(sync::awake_clock().now()); });
+  return ask([](const sync::Servers& servers) { return servers.runs(app::awake_clock().now()); });
 }
 
 bool ServerDirectory::is_known(std::uint64_t run_id) const {
   return ask([&](const sync::Servers& servers) {
-    return servers.is_known(run_id, sync::awake_clock().now());
+    return servers.is_known(run_id, app::awake_clock().now());
   });
 }
 
@@ -184,14 +184,14 @@ bool ServerDirectory::may_fly(std::uint64_t run_id, std::uint32_t vehicle_id) co
 
 std::optional<sync::Run> ServerDirectory::find_joinable(std::uint32_t vehicle_id) const {
   return ask([&](const sync::Servers& servers) {
-    return servers.find_joinable(vehicle_id, sync::awake_clock().now());
+    return servers.find_joinable(vehicle_id, app::awake_clock().now());
   });
 }
 
 std::optional<sync::Run> ServerDirectory::find_successor(
     const sync::Run& run, const std::vector<std::uint32_t>& vehicle_ids) const {
   return ask([&](const sync::Servers& servers) {
-    return servers.find_successor(run, vehicle_ids, sync::awake_clock().now());
+    return servers.find_successor(run, vehicle_ids, app::awake_clock().now());
   });
 }
 

@@ -4,8 +4,8 @@
 
 namespace sls::sync {
 
-/// A moment of awake time (awake_clock.hpp). The rules of synchronisation get it as an argument and
-/// ask no clock, so a test can choose it.
+/// A moment of awake time (common/app/awake_clock.hpp). The rules of synchronisation get it as an
+/// argument and ask no clock, so a test can choose it.
 using Time = std::chrono::steady_clock::time_point;
 using Duration = Time::duration;
 

@@ -15,7 +15,7 @@ import warnings
 
 import campaign_engine_support
 import sls
-from own_domain import OwnDomain
+from own_domain import own_domain
 from places import BUILD, ROOT
 from sls import measures
 from sls.campaign import cli
@@ -183,7 +183,7 @@ class DamagedFilesTest(campaign_engine_support.CampaignTest):
         for folder in ("qos", "faults"):
             shutil.copytree(ROOT / "config" / folder, whole / folder)
         subprocess.run([ROOT / "config/security/keys.sh", whole / "keys"], check=True, capture_output=True)
-        domain, short = self.enterContext(OwnDomain()), ROOT / "config/scenarios/short.yaml"
+        domain, short = self.enterContext(own_domain()), ROOT / "config/scenarios/short.yaml"
 
         def start(program, *words):
             def read(folder):

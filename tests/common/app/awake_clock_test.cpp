@@ -1,4 +1,4 @@
-#include "common/sync/awake_clock.hpp"
+#include "common/app/awake_clock.hpp"
 
 #include <gtest/gtest.h>
 
@@ -6,10 +6,12 @@
 #include <thread>
 #include <vector>
 
-namespace sls::sync {
+namespace sls::app {
 namespace {
 
-Time at(std::int64_t ms) { return Time(std::chrono::hours(1) + std::chrono::milliseconds(ms)); }
+sync::Time at(std::int64_t ms) {
+  return sync::Time(std::chrono::hours(1) + std::chrono::milliseconds(ms));
+}
 
 TEST(AwakeClockTest, WithoutAnExpectedLookItIsTheSteadyClock) {
   AwakeClock clock;
@@ -47,10 +49,10 @@ TEST(AwakeClockTest, ManyThreadsCountAStopOnceAndTimeNeverGoesBack) {
   std::vector<std::thread> threads;
   for (int i = 0; i < 4; ++i)
     threads.emplace_back([&] {
-      Time last = clock.now();
-      const Time end = std::chrono::steady_clock::now() + std::chrono::milliseconds(300);
+      sync::Time last = clock.now();
+      const sync::Time end = std::chrono::steady_clock::now() + std::chrono::milliseconds(300);
       while (std::chrono::steady_clock::now() < end) {
-        const Time now = clock.now();
+        const sync::Time now = clock.now();
         if (now < last) ++went_back;
         last = now;
       }
@@ -61,4 +63,4 @@ TEST(AwakeClockTest, ManyThreadsCountAStopOnceAndTimeNeverGoesBack) {
 }
 
 }  // namespace
-}  // namespace sls::sync
+}  // namespace sls::app
