@@ -189,7 +189,7 @@ class DamagedFilesTest(campaign_engine_support.CampaignTest):
             def read(folder):
                 done = subprocess.run(
                     [BUILD / "bin" / program, *(str(word).replace("DIR", str(folder)) for word in words)],
-                    env={**os.environ, "SLS_KEYS": str(folder / "keys"), "SLS_PEERS": "", "SLS_DOMAIN": domain},
+                    env={**os.environ, "SLS_KEYS": str(folder / "keys"), "SLS_PEERS": "", "SLS_DOMAIN": str(domain)},
                     capture_output=True, stdin=subprocess.DEVNULL, timeout=100,
                     preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_CPU, (10, 10)))
                 said = (done.stdout + done.stderr).decode()
