@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cctype>
-#include <thread>
 
 #include "common/app/log.hpp"
 #include "common/app/run_main.hpp"

@@ -1,7 +1,6 @@
 #include "recorder/recorder.hpp"
 
 #include <chrono>
-#include <thread>
 
 #include "common/app/log.hpp"
 #include "common/app/run_main.hpp"

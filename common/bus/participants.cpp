@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <thread>
 #include <type_traits>
 #include <utility>
 
@@ -17,7 +16,6 @@ namespace sls::bus {
 namespace {
 
 using namespace std::chrono_literals;
-using Clock = std::chrono::steady_clock;
 
 }  // namespace
 

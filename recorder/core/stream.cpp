@@ -12,8 +12,6 @@
 namespace sls::record {
 namespace {
 
-using namespace std::chrono_literals;
-
 /// A missing batch is lost when more than this many later ones wait, or after this time.
 constexpr std::size_t kMaxWaiting = 64;
 constexpr double kMaxStuckTime = 10;  // s

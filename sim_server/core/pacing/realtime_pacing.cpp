@@ -78,8 +78,10 @@ bool RealtimePacing::is_ending() const {
 }
 
 bool RealtimePacing::wait_for_last_answers(sync::Time now) {
-  if (!is_ending()) last_attempts_ = 0;  // a late end may have been withdrawn
-  if (last_attempts_ == 0 && !is_ending()) return false;
+  if (!is_ending()) {
+    last_attempts_ = 0;  // a late end may have been withdrawn
+    return false;
+  }
   if (last_attempts_ == kLastAttempts)
     throw std::runtime_error(
         fmt::format("step {}: the mission was finished, but {} does not answer", run_.fleet.step(),
