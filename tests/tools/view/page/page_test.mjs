@@ -155,8 +155,9 @@ test("a connection that is lost is found again without reload, and the picture s
   }, { expected: /WebSocket|ERR_CONNECTION/ });
 });
 
-test("a fleet of 100 is drawn, and a click chooses a vehicle", async () => {
+test("a fleet of 100 is drawn, and a click chooses a vehicle", async (t) => {
   const fleet = await startFlight({ base: "fleet", change: (text) => text.replace("vehicles: 10", "vehicles: 100"), rtf: 0.05 });
+  t.after(fleet.stop);
   await withPage([], {}, async (page) => {
     await untilFlies(page);
     await page.evaluate(() => {
@@ -172,18 +173,20 @@ test("a fleet of 100 is drawn, and a click chooses a vehicle", async () => {
     await page.mouse.click(...await waitFor("its place", () => page.evaluate(() => window.slsView.projection(42)?.quad)));
     await waitFor("vehicle 42", async () => (await state(page)).selected === 42);
     assert.ok(await page.evaluate(() => window.sent.some(({ op, vehicle_id }) => op === "select" && vehicle_id === 42)));
-  }, { on: fleet }).finally(fleet.stop);
+  }, { on: fleet });
 });
 
-test("no flight: the page says what is missing, with the command", async () => {
+test("no flight: the page says what is missing, with the command", async (t) => {
   const nothing = await startFlight({ hasFlight: false });
+  t.after(nothing.stop);
   await withPage([], {}, async (page) => {
     await waitFor("command", () => page.$eval("#command", ({ textContent }) => textContent.startsWith("./sls run")));
-  }, { on: nothing }).finally(nothing.stop);
+  }, { on: nothing });
 });
 
-test("no WebGL: a table of positions and the plots", async () => {
+test("no WebGL: a table of positions and the plots", async (t) => {
   const flat = await startBrowser({ flags: [...kLean, "--disable-3d-apis"] });
+  t.after(flat.stop);
   const check = async (page) => {
     await untilFlies(page);
     assert.equal((await state(page)).has_scene, false);
@@ -193,7 +196,7 @@ test("no WebGL: a table of positions and the plots", async () => {
     const titles = await page.$$eval(".plot-title", (all) => all.map(({ textContent }) => textContent));
     for (const title of ["Force x, y", "Force z"]) assert.ok(titles.includes(title), title);
   };
-  await withPage([], {}, check, { expected: /./, browser: flat.browser }).finally(flat.stop);
+  await withPage([], {}, check, { expected: /./, browser: flat.browser });
 });
 
 test("without the token there are no buttons; it leaves the address and is in no request", async () => {
@@ -229,8 +232,10 @@ test("a phone shows everything without scrolling sideways, and every control has
   });
 });
 
-test("a page opened in a pause shows what was flown before, and at the end the whole recording", async () => {
+test("a page opened in a pause shows what was flown before, and at the end the whole recording", async (t) => {
   const paused = await startFlight({ rtf: 0.4 });
+  t.after(paused.stop);
+  await waitFor("a flight", () => paused.status().step > 0);
   const expectWhole = (times, end) =>
     assert.deepEqual(times.map((time) => Math.round(time / 0.004)), Array.from({ length: end + 1 }, (_, step) => step));
   const readTimes = (page) => page.evaluate(() => window.slsView.plotted());
@@ -260,11 +265,12 @@ test("a page opened in a pause shows what was flown before, and at the end the w
     assert.match(await readText(page, "#banner"), new RegExp(`^note .*its recording; ./sls view ${join(paused.folder, "recording")} shows`));
     const end = readFileSync(join(paused.folder, "recording/state.csv"), "utf8").trimEnd().split("\n").length - 2;
     expectWhole(await readTimes(page), end);
-  }, { on: paused }).finally(paused.stop);
+  }, { on: paused });
 });
 
-test("after the end of a flight the page replays it, also without sls_view", async () => {
+test("after the end of a flight the page replays it, also without sls_view", async (t) => {
   const ended = await startFlight();
+  t.after(ended.stop);
   await withPage([], { scheme: "light" }, async (page, { viewer }) => {
     await untilFlies(page, 500);
     await page.click("#table-toggle");
@@ -286,5 +292,5 @@ test("after the end of a flight the page replays it, also without sls_view", asy
     const recorded = readRecorded(step, ended);
     for (const part of ["quad", "load"])
       pose[part].slice(0, 3).forEach((value, axis) => assert.ok(Math.abs(value - recorded[part][axis]) < 1e-3, `${part} ${value}`));
-  }, { on: ended, expected: /WebSocket|ERR_CONNECTION/ }).finally(ended.stop);
+  }, { on: ended, expected: /WebSocket|ERR_CONNECTION/ });
 });
