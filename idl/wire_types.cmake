@@ -26,9 +26,11 @@ function(sls_add_wire_types library name)
     file(CONFIGURE OUTPUT ${generated}/${name}.h CONTENT "#include \"${name}.hpp\"\n")
     file(CONFIGURE OUTPUT ${generated}/${name}PubSubTypes.h CONTENT "#include \"${name}PubSubTypes.hpp\"\n")
   endif()
+  # Without -t it writes /tmp/NAME.idl.cc, which two builds at once or another user's build may hold.
   add_custom_command(
     OUTPUT ${sources} ${headers}
-    COMMAND ${FASTDDSGEN} -replace -cs ${options} -d ${generated} ${CMAKE_CURRENT_BINARY_DIR}/${name}.idl
+    COMMAND ${FASTDDSGEN} -replace -cs ${options} -t ${CMAKE_CURRENT_BINARY_DIR} -d ${generated}
+            ${CMAKE_CURRENT_BINARY_DIR}/${name}.idl
     DEPENDS ${CMAKE_CURRENT_BINARY_DIR}/${name}.idl
     WORKING_DIRECTORY ${generated}
     COMMENT "Generating the wire types of ${name}.idl")
