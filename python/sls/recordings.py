@@ -353,7 +353,7 @@ class Recording(VehicleColumns):
             count = (sum(gap["to"] - gap["from"] + 1 for gap in manifest["missing"])
                      + manifest.get("further_missing", {}).get("samples", 0))
             first = manifest["missing"][0]
-            unit = "sample" if first["topic"] == "sls/status" else "step"
+            unit = {"sls/status": "sample", "sls/record": "batch"}.get(first["topic"], "step")
             notes.append(f"{count} samples missing, first {first['topic']} {unit} {first['from']} "
                          f"of vehicle {first['vehicle_id']}")
         notes += [f"{name}: the last row is cut off and left out"

@@ -10,7 +10,7 @@
 namespace sls::record {
 
 /// Consecutive steps of one topic that are not in the recording. For sls/status, from and to are
-/// values of sample_index.
+/// values of sample_index, for sls/record of batch_index.
 struct MissingSteps {
   std::uint32_t vehicle_id = 0;
   std::string topic;

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "common/bus/names.hpp"
+#include "common/bus/topics.hpp"
 
 namespace sls::record {
 
@@ -150,6 +151,9 @@ Claims RecordingCore::on_end(const Interruption& interruption, std::uint64_t ref
   claims_.refused_samples = refused_samples;
   stream_.give_up();
   note_missing_end();
+  if (is_finished() && gaps_.missing().empty())  // no step is missing, so late answers are
+    for (const MissingSteps& batches : stream_.missing_batches().listed)
+      gaps_.add(batches.vehicle_id, bus::Topic<RecordBatch>::kName, batches.from, batches.to);
   if (!interruption_.empty()) outputs_.add_event("recorder: " + interruption_);
   const MissingSamples& missing = gaps_.missing();
   if (!missing.empty()) outputs_.add_event("recorder: " + describe(missing));

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/bus/convert.hpp"
+#include "common/bus/topics.hpp"
 #include "common/sync/servers.hpp"
 
 namespace sls::record {
@@ -64,8 +65,14 @@ void Stream::handle_waiting_batches() {
 }
 
 void Stream::skip_missing_batches() {
+  note_missing_batches(waiting_.begin()->first - 1);
   next_batch_ = waiting_.begin()->first;
   handle_waiting_batches();
+}
+
+void Stream::note_missing_batches(std::uint64_t last) {
+  missing_batches_.add(next_steps_.begin()->first, bus::Topic<RecordBatch>::kName, *next_batch_,
+                       last);
 }
 
 void Stream::on_time(sync::Time now) {
@@ -83,6 +90,7 @@ std::optional<std::string> Stream::take_report(sync::Time now) {
 
 void Stream::give_up() {
   while (!waiting_.empty()) skip_missing_batches();
+  if (next_batch_ && !has_ended_) note_missing_batches(*next_batch_);
   has_ended_ = true;
   hand_on_settled_steps();
 }

@@ -10,6 +10,7 @@
 #include <string>
 
 #include "common/sync/patience.hpp"
+#include "recorder/core/gaps.hpp"
 #include "recorder/rows.hpp"
 #include "sls.h"
 
@@ -62,6 +63,10 @@ class Stream {
 
   const DroppedEntries& dropped() const { return dropped_; }
 
+  /// The batches that were not waited for any longer. After `give_up` also the next one, if the last
+  /// one of the run has not come. A batch without steps had only late answers.
+  const MissingSamples& missing_batches() const { return missing_batches_.missing(); }
+
  private:
   void handle(const RecordBatch& batch);
   /// Handles the record in `next_`.
@@ -69,6 +74,8 @@ class Stream {
   void handle_late(const model::StepRecord& late);
   void handle_waiting_batches();
   void skip_missing_batches();
+  /// From the next batch to `last`.
+  void note_missing_batches(std::uint64_t last);
   void begin_to_wait(sync::Time now);
   bool may_be_answered(const StepRows& rows) const;
   void hand_on_settled_steps();
@@ -87,6 +94,7 @@ class Stream {
   StepRows next_;  // its memory is used again for each step
   std::deque<StepRows> pending_;
   DroppedEntries dropped_;
+  GapList missing_batches_;
 };
 
 }  // namespace sls::record

@@ -18,6 +18,10 @@ class LockstepPacing : public Pacing {
   void published(const Moment& moment) override;
   bool close(sync::Time now) override;
   sync::Time deadline() const override { return look_at_; }
+  /// Its client is back: the step in work waits for it again, for the whole deadline.
+  void note_late(Vehicle& vehicle, const OfferedAnswer& answer, sync::Time) override {
+    vehicle.keep_late_answer(answer);
+  }
 
  private:
   void take_answered_step(sync::Time now);

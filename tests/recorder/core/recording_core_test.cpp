@@ -1,5 +1,6 @@
 #include "recorder/core/recording_core.hpp"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <spdlog/fmt/fmt.h>
 
@@ -351,6 +352,25 @@ TEST_F(RecordingCoreTest, AMissingBatchIsReportedAfterASecondAndGivenUpAfterTen)
   EXPECT_EQ(look(10'100, 10'100), "row2 ");
   EXPECT_EQ(core_->phase(), Phase::kWhole);
   EXPECT_EQ(to_text(end().missing), "state 1-1 command 1-1 reference 1-1 ");
+}
+
+TEST_F(RecordingCoreTest, ALostBatchOfLateAnswersIsAGap) {
+  for (const std::uint64_t lost : {5, 10}) {
+    begin();
+    tell(kFinished, 9);
+    for (std::uint64_t batch = 0; batch < 10; ++batch) {
+      if (batch == lost) ++batch_;
+      receive({make_entry(batch)});
+    }
+    if (lost < 10) receive({}, true, 10'000);
+    core_->on_time(at(30'000));
+    const Claims claims = end("stopped");
+    EXPECT_FALSE(claims.complete);
+    EXPECT_EQ(to_text(claims.missing), fmt::format("record {0}-{0} ", lost));
+    EXPECT_THAT(core_->describe_gaps(),
+                testing::HasSubstr(fmt::format(
+                    "1 samples missing, first sls/record batch {} of vehicle 0", lost)));
+  }
 }
 
 // --- every event in every phase ------------------------------------------------------------------

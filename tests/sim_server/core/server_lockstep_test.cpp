@@ -326,6 +326,24 @@ TEST(ServerLockstepTest, PolicyFailSafeUsesTheFailSafeFromTheBeginning) {
   EXPECT_EQ(rig.core().end(), End::kFailed) << "wait_for.timeout_s";
 }
 
+TEST(ServerLockstepTest, ALateAnswerBringsItsClientBack) {
+  for (const auto policy : {config::ControllerPolicy::kHold, config::ControllerPolicy::kFailsafe}) {
+    ServerRig rig(with_policy(policy, 1));
+    rig.join("far");  // its round trip of 10 ms is longer than a period
+    rig.wait_until(1009);
+    EXPECT_EQ(rig.step(), 3u);
+    rig.take_records();
+    rig.answer("far", 0);
+    rig.answer("far", 1);
+    rig.wait_until(1018);
+    EXPECT_EQ(rig.step(), 3u) << "it is awaited again";
+    rig.answer("far", 2);
+    rig.answer("far", 3);
+    EXPECT_EQ(rig.take_records(), (Lines{"late 0", "late 1", "late 2", "3 accepted"}));
+    EXPECT_EQ(rig.step(), 4u);
+  }
+}
+
 TEST(ServerLockstepTest, APauseIsNoAbsence) {
   ServerRig rig(with_policy(config::ControllerPolicy::kWait, 1));
   rig.join("pilot");
