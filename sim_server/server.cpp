@@ -7,8 +7,11 @@
 #include <utility>
 
 #include "common/app/awake_clock.hpp"
+#include "common/app/log.hpp"
 #include "common/app/options.hpp"
 #include "common/app/run_main.hpp"
+#include "common/app/stop_signal.hpp"
+#include "common/app/wait.hpp"
 #include "common/bus/spinning.hpp"
 #include "common/config/vehicle_ids.hpp"
 #include "sim_server/messages.hpp"
@@ -51,7 +54,7 @@ void Server::run() {
     bus::stop_spinning();
     if (core->end() != ServerCore::End::kReset) break;
     try {
-      core = make_core({0, false, core->is_paused()});
+      core = make_core(core->make_next_start());
     } catch (const std::exception& error) {
       // The ended run tells the participants that it has no successor.
       core->on_failure(error.what(), app::awake_clock().now());
@@ -80,12 +83,23 @@ std::unique_ptr<ServerCore> Server::make_core(ServerCore::Start start) {
 }
 
 void Server::linger(const ServerCore& core) {
-  // The recorders first, because this wait names those that are not done.
-  const int expected = core.end() == ServerCore::End::kFailed ? 0 : core.expected_recorders();
-  bus::wait_for_recorders_to_end(endpoints_.participants, core.run_id(), expected);
-  endpoints_.records.wait_for_acknowledgments(1s);
-  endpoints_.status.wait_for_acknowledgments(1s);
-  endpoints_.replies.wait_for_acknowledgments(1s);  // to the operator who stopped the run
+  Leaving leaving = core.leave(app::awake_clock().now());
+  const auto look = [&] {
+    const bool is_acknowledged = endpoints_.records.wait_for_acknowledgments(0s) &&
+                                 endpoints_.status.wait_for_acknowledgments(0s) &&
+                                 endpoints_.replies.wait_for_acknowledgments(0s);
+    const auto& participants = endpoints_.participants;
+    return leaving.look({participants.find(ParticipantRole::ROLE_RECORDER, core.run_id()),
+                         participants.count_done(ParticipantRole::ROLE_RECORDER, core.run_id()),
+                         app::stop_signal() != 0, is_acknowledged},
+                        app::awake_clock().now());
+  };
+  for (bool is_over = false; !is_over;) {
+    is_over = look();
+    for (const sync::Line& line : leaving.take_lines()) app::log(line);
+    if (!is_over) app::sleep_for(app::kShortPollTime);
+  }
+  if (!leaving.error().empty()) throw app::RunError(leaving.error());
 }
 
 void Server::fill(CommandSample& received, const Commands& sample,

@@ -37,6 +37,7 @@ class Server {
   /// Makes the core of a new run and announces the run. `start` lacks the run id.
   std::unique_ptr<ServerCore> make_core(ServerCore::Start start);
   /// Keeps the writers until the recorders are done with the run of `core`.
+  /// @throws app::RunError if an expected recorder does not finish.
   void linger(const ServerCore& core);
   /// Fills in the sample that the reader of commands is receiving.
   void fill(CommandSample& received, const Commands& sample, const bus::PeerId& sender) const;

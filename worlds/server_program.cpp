@@ -84,7 +84,7 @@ void ServerProgram::begin_run(sim::ServerCore::Start start) {
 // --- the main thread -----------------------------------------------------------------------------
 
 void ServerProgram::wake() {
-  if (linger_) return linger();
+  if (leaving_) return linger();
   write_waiting();
   if (core_->phase() != sim::ServerCore::Phase::kEnded) {
     if (core_->has_news(*this)) core_->on_look(*this, now());
@@ -93,7 +93,7 @@ void ServerProgram::wake() {
     if (core_->is_look_due(now())) core_->on_look(*this, now());
   }
   if (core_->phase() == sim::ServerCore::Phase::kEnded) end_run();
-  if (!process_.has_ended()) wake_at(linger_ ? now() : core_->next_deadline());
+  if (!process_.has_ended()) wake_at(leaving_ ? now() : core_->next_deadline());
 }
 
 void ServerProgram::deliver_events() {
@@ -109,32 +109,29 @@ void ServerProgram::end_run() {
   write_waiting();
   setting_.properties.on_run_end(core_->run_id(), core_->end() == sim::ServerCore::End::kFinished,
                                  certificate_->finish(), setting_.network);
-  if (core_->end() == sim::ServerCore::End::kReset)
-    return begin_run({0, false, core_->is_paused()});
+  if (core_->end() == sim::ServerCore::End::kReset) return begin_run(core_->make_next_start());
   if (core_->error().find("expected no other server") != std::string::npos)
     setting_.properties.on_yielded(*this, core_->run_id(), setting_.network);
   if (!core_->is_known()) return exit(1, core_->error());
-  linger_.emplace(now(),
-                  core_->end() == sim::ServerCore::End::kFailed ? 0 : core_->expected_recorders(),
-                  sync::RecorderPatience());
+  leaving_.emplace(core_->leave(now()));
 }
 
 /// As Server::linger.
 void ServerProgram::linger() {
-  if (!acknowledged_by_) {
-    sync::Membership& members = present_members();
-    const auto recorders = members.find(ParticipantRole::ROLE_RECORDER, core_->run_id());
-    const int done = members.count_done(ParticipantRole::ROLE_RECORDER, core_->run_id());
-    if (linger_->is_over(recorders, done, was_interrupted(), now()))
-      acknowledged_by_ = now() + 1s;
-    else if (const auto report = linger_->take_report(recorders, now()))
-      say(*report);
-    return wake_at(now() + 20ms);
-  }
-  const bool is_heard =
-      peer_.is_acknowledged(TopicId::kRecord) && peer_.is_acknowledged(TopicId::kStatus);
-  if (!is_heard && now() < *acknowledged_by_) return wake_at(now() + 20ms);
-  exit(core_->end() == sim::ServerCore::End::kFailed ? 1 : 0, core_->error());
+  sync::Membership& members = present_members();
+  const bool is_acknowledged = peer_.is_acknowledged(TopicId::kRecord) &&
+                               peer_.is_acknowledged(TopicId::kStatus) &&
+                               peer_.is_acknowledged(TopicId::kControlReply);
+  const bool is_over =
+      leaving_->look({members.find(ParticipantRole::ROLE_RECORDER, core_->run_id()),
+                      members.count_done(ParticipantRole::ROLE_RECORDER, core_->run_id()),
+                      was_interrupted(), is_acknowledged},
+                     now());
+  for (const sync::Line& line : leaving_->take_lines()) say(line);
+  if (!is_over) return wake_at(now() + 20ms);
+  const bool has_failed = core_->end() == sim::ServerCore::End::kFailed;
+  const std::string& error = has_failed ? core_->error() : leaving_->error();
+  exit(error.empty() ? 0 : 1, error);
 }
 
 void ServerProgram::write_waiting() {
@@ -162,7 +159,7 @@ void ServerProgram::write_waiting() {
 // --- the middleware's thread ---------------------------------------------------------------------
 
 void ServerProgram::on_commands(const Commands& sample, const Peer::Arrival& arrival) {
-  if (!core_ || linger_) return;
+  if (!core_ || leaving_) return;
   flight_->on_answers(sample, sender(arrival), setting_.timeline.now());
   sim::CommandSample received;
   received.sender = arrival.sender;

@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "closed_loop/flight_certificate.hpp"
-#include "common/sync/recorders_end.hpp"
 #include "sim_server/core/server_core.hpp"
 #include "sim_server/record_stream.hpp"
 #include "sim_server/state_stream.hpp"
@@ -97,8 +96,7 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   std::size_t steps_ = 0;  // of the entries of batches_
   std::uint64_t written_ = 0;
   std::uint64_t flush_number_ = 0;
-  std::optional<sync::RecordersEnd> linger_;
-  std::optional<sync::Time> acknowledged_by_;
+  std::optional<sim::Leaving> leaving_;
   std::optional<closed_loop::FlightCertificate> certificate_;
 };
 

@@ -79,19 +79,6 @@ void Announcer::repeat_if_due() {
     announce(Participant(*last_));
 }
 
-void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
-                               int expected, const sync::RecorderPatience& patience) {
-  sync::RecordersEnd end(app::awake_clock().now(), expected, patience);
-  while (true) {
-    const auto recorders = participants.find(ParticipantRole::ROLE_RECORDER, run_id);
-    const int done = participants.count_done(ParticipantRole::ROLE_RECORDER, run_id);
-    const auto now = app::awake_clock().now();
-    if (end.is_over(recorders, done, app::stop_signal() != 0, now)) return;
-    if (const auto report = end.take_report(recorders, now)) spdlog::info("{}", *report);
-    app::sleep_for(app::kShortPollTime);
-  }
-}
-
 ServerDirectory::ServerDirectory(Node& node, std::function<void(const SimStatus&)> on_status)
     : node_(node),
       self_(node.id()),

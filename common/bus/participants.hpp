@@ -15,7 +15,6 @@
 
 #include "common/bus/node.hpp"
 #include "common/sync/membership.hpp"
-#include "common/sync/recorders_end.hpp"
 #include "common/sync/servers.hpp"
 
 namespace sls::bus {
@@ -76,10 +75,6 @@ class Announcer {
   std::optional<Participant> last_;
   std::chrono::steady_clock::time_point time_;
 };
-
-/// Waits as sync::RecordersEnd says for the recorders of run `run_id`. Logs those that are missing.
-void wait_for_recorders_to_end(const ParticipantDirectory& participants, std::uint64_t run_id,
-                               int expected, const sync::RecorderPatience& patience = {});
 
 /// sync::Servers of a domain.
 class ServerDirectory {

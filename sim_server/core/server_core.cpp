@@ -181,6 +181,11 @@ void ServerCore::begin_flight(sync::Time now) {
   publish_if_allowed(now);
 }
 
+Leaving ServerCore::leave(sync::Time now) const {
+  const bool may_lack = parts_.scenario.sync.wait.recorder.policy == config::RecorderPolicy::kGoOn;
+  return Leaving(error_.empty() ? recorders_.expected() : 0, !may_lack, now);
+}
+
 bool ServerCore::is_between_steps() const {
   return phase_ == Phase::kResting || phase_ == Phase::kAwaitingRecorders ||
          phase_ == Phase::kAwaitingDue;

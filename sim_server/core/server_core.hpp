@@ -5,6 +5,7 @@
 #include <string>
 
 #include "common/config/scenario.hpp"
+#include "sim_server/core/leaving.hpp"
 #include "sim_server/core/pacing/pacing.hpp"
 #include "sim_server/core/participants/preparation.hpp"
 #include "sim_server/core/participants/recorder_wait.hpp"
@@ -45,7 +46,7 @@ class ServerCore {
  public:
   struct Start {
     std::uint64_t run_id = 0;
-    bool claims = true;          ///< false for a run that follows another one of this server
+    bool claims = true;          ///< false if this server has its vehicles from an earlier run
     bool begins_paused = false;  ///< as the run before a reset was
   };
 
@@ -95,8 +96,10 @@ class ServerCore {
   bool is_paused() const { return parts_.control.is_paused(); }
   /// True once participants may have joined.
   bool is_known() const { return parts_.report.has_published(); }
-  /// Number of recorders that must get the whole run.
-  int expected_recorders() const { return recorders_.expected(); }
+  /// After the last run: the end of the server, which begins at `now`.
+  Leaving leave(sync::Time now) const;
+  /// After a reset: how the next run begins.
+  Start make_next_start() const { return {0, !is_known(), is_paused()}; }
 
  private:
   /// Does `work`; an exception of it ends the run.

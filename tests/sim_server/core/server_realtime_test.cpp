@@ -209,6 +209,22 @@ TEST_F(ServerRealtimeTest, ALateEndWithoutALastAnswerFailsAfterASecond) {
             "step 251: the mission was finished, but controller 'pilot' on box does not answer");
 }
 
+TEST_F(ServerRealtimeTest, AWithdrawnLateEndLeavesTheNextOneItsWholeTime) {
+  fly_to(249);
+  rig_.wait_until(1004);
+  ServerRig::Answer last{250};
+  last.is_last = true;
+  rig_.answer("pilot", last);
+  rig_.wait_until(1900);
+  rig_.answer("pilot", 251);  // the mission goes on
+  rig_.wait(5);
+  last.step = 252;
+  rig_.answer("pilot", last);
+  rig_.wait(950);
+  EXPECT_EQ(rig_.core().error(), "");
+  EXPECT_EQ(rig_.step(), 253u);
+}
+
 TEST_F(ServerRealtimeTest, ALawThatTakesLongerThanAPeriodIsNamed) {
   for (std::uint64_t step = 0; step < 300; ++step) {
     rig_.wait_until(static_cast<std::int64_t>(step) * 4 + 3);

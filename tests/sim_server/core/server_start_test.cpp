@@ -48,6 +48,16 @@ TEST(ServerStartTest, TheServerThatLosesItsClaimPublishesNothing) {
   EXPECT_FALSE(rig.core().is_known());
 }
 
+TEST(ServerStartTest, TheRunAfterAResetClaimsUnlessTheOneBeforeHasClaimed) {
+  for (const bool has_claimed : {false, true}) {
+    ServerRig rig(ServerRig::make_scenario(), kClaims);
+    rig.wait_until(has_claimed ? 250 : 245);
+    rig.request(ControlAction::ACTION_RESET);
+    EXPECT_EQ(rig.core().end(), ServerCore::End::kReset);
+    EXPECT_EQ(rig.core().make_next_start().claims, !has_claimed);
+  }
+}
+
 TEST(ServerStartTest, ARunThatEndsBeforeTheClaimIsSettledIsNoRival) {
   ServerRig rig(ServerRig::make_scenario(), kClaims);
   rig.other_runs = {make_rival(ServerRig::kRunId - 1)};
