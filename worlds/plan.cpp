@@ -258,10 +258,11 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
 /// Longest stop of a client in a world of kLongStop, before it is absent for too long.
 double calc_longest_stop_s(const config::Sync& sync) { return sync.wait.controller.deadline_s - 2; }
 
-/// A promise holds only if policies wait, and 8 s are enough for what happens.
+/// A promise holds only if 8 s are enough for what happens, and all but one only if policies wait.
 Promise draw_promise(Random& random, const FlownScenario& flown) {
   const config::Sync& sync = flown.scenario.sync;
   const double choice = random.uniform();
+  if (choice < 0.04 && flown.failure.empty()) return Promise::kSuspend;
   if (choice < 0.35 || !flown.failure.empty()) return Promise::kNone;
   const bool is_realtime = sync.mode == config::SyncMode::kRealtime;
   if (choice < (is_realtime ? 0.55 : 0.42)) return Promise::kCalm;
@@ -291,6 +292,27 @@ void draw_silences(Plan& plan, Random& random, const FlownScenario& flown) {
     const double least_s = i == 1 ? longest_s + 1 : 1.2;
     fault.duration = draw_seconds(random, least_s, least_s + 0.5);
     plan.faults.push_back(fault);
+  }
+}
+
+/// Stops that are nobody's absence, whatever the policies.
+void draw_suspension(Plan& plan, Random& random, const FlownScenario& flown) {
+  const bool is_of_server = random.chance(0.5);
+  Fault stop;
+  stop.kind = Kind::kStop;
+  if (random.chance(0.7)) {
+    stop.step = draw_step(random, flown, 5);
+  } else {
+    for (const PlannedProgram& program : plan.programs) stop.at = std::max(stop.at, program.start);
+    stop.at += draw_time(random, 0ms, 2s);
+  }
+  const config::Sync& sync = flown.scenario.sync;
+  const double others_wait_s = std::min(sync.wait.server_deadline_s, sync.wait_for.timeout_s);
+  const Instant duration = draw_seconds(random, 0.5, is_of_server ? others_wait_s - 2 : 20);
+  for (stop.target = 0; stop.target < plan.programs.size(); ++stop.target) {
+    if (is_of_server && plan.programs[stop.target].role != Role::kServer) continue;
+    stop.duration = duration + draw_time(random, 0ms, 20ms);  // they go on one after another
+    plan.faults.push_back(stop);
   }
 }
 
@@ -455,6 +477,7 @@ void draw_faults(Plan& plan, Random& random, const FlownScenario& flown) {
   if (plan.promise == Promise::kLongStop && random.chance(0.5))
     return draw_silences(plan, random, flown);
   if (plan.promise == Promise::kPause) return draw_pause(plan, random, flown);
+  if (plan.promise == Promise::kSuspend) return draw_suspension(plan, random, flown);
   if (plan.promise > Promise::kMild) {
     plan.faults.push_back(draw_promised(plan, random, flown));
     if (plan.promise == Promise::kRecorderRestart && random.chance(0.5))
@@ -483,8 +506,8 @@ void draw_faults(Plan& plan, Random& random, const FlownScenario& flown) {
 
 const char* name_promise(Promise promise) {
   static constexpr const char* kNames[] = {
-      "no promise", "mild",  "take-over", "server restart", "recorder restart",
-      "calm",       "reset", "pause",     "long stop",      "two servers"};
+      "no promise", "mild",  "take-over", "server restart", "recorder restart", "calm",
+      "reset",      "pause", "long stop", "two servers",    "suspended"};
   return kNames[static_cast<int>(promise)];
 }
 
@@ -509,16 +532,19 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
   const faults::Case* given = cases.empty() ? nullptr : &cases[random.index(cases.size())];
   if (!given) plan.promise = draw_promise(random, flown);
   plan.hosts = static_cast<std::size_t>(random.integer(given ? 2 : 1, 4));
-  plan.link = given                            ? make_link(given->link, random)
-              : plan.promise == Promise::kCalm ? Link()
-                                               : draw_link(random);
+  plan.link = given ? make_link(given->link, random)
+              : plan.promise == Promise::kCalm || plan.promise == Promise::kSuspend
+                  ? Link()
+                  : draw_link(random);
   // With much loss two servers may receive each other's claims only after both have begun to wait
   // for participants: with 0.02 this happened in one of 650,000 worlds of all kinds, seed 620959.
   if (plan.promise == Promise::kTwoServers) plan.link.loss = std::min(plan.link.loss, 0.005);
   plan.drift = random.chance(0.3) ? random.between(-1e-4, 1e-4) : 0;
   plan.wall_offset_s = random.chance(0.3) ? random.between(-20, 20) : 0;
   plan.healed = draw_time(random, 1s, is_lockstep ? Instant(6s) : Instant(4s));
-  if (plan.promise == Promise::kLongStop || plan.promise == Promise::kPause) plan.healed = 60s;
+  if (plan.promise == Promise::kLongStop || plan.promise == Promise::kPause ||
+      plan.promise == Promise::kSuspend)
+    plan.healed = 60s;
   plan.has_files = plan.promise == Promise::kRecorderRestart || random.chance(0.08);
   draw_programs(plan, random, flown, given);
   if (given) {

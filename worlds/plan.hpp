@@ -87,6 +87,8 @@ enum class Promise {
   kLongStop,         ///< a client is stopped for longer than it waits for a silent server, or the
                      ///< server twice, for less
   kTwoServers,       ///< a second server is started with the first
+  kSuspend,  ///< all programs are stopped for the same time, or the server alone for less than
+             ///< the others wait
 };
 const char* name_promise(Promise promise);
 

@@ -410,7 +410,9 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
                        run.is_exact ? "" : "not ", run.timing));
     if (plan.promise == Promise::kCalm && run.began && !run.is_match_late)
       check_begin(run_id, run, flown);
-    if (plan.promise == Promise::kCalm && run.is_finished && !run.is_exact)
+    const bool is_lockstep = flown.scenario.sync.mode == config::SyncMode::kLockstep;
+    if ((plan.promise == Promise::kCalm || (plan.promise == Promise::kSuspend && is_lockstep)) &&
+        run.is_finished && !run.is_exact)
       find(fmt::format("calm: run {:016x} has late steps", run_id));
   }
   // In real time nobody waits for a link that carries less than is sent.
