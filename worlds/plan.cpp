@@ -559,6 +559,9 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
   if (plan.promise == Promise::kNone && random.chance(0.1))
     plan.record_history = static_cast<std::size_t>(random.integer(5, 50));
   draw_faults(plan, random, flown);
+  // Faults then last beyond every deadline.
+  if (plan.promise == Promise::kNone && random.chance(0.2))
+    plan.healed += draw_time(random, 0s, 30s);
   return plan;
 }
 
