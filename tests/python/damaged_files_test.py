@@ -74,7 +74,7 @@ def damage_file(draw, file):
     if draw.random() > 0.1:
         text = file.read_bytes().decode(errors="surrogateescape")
         for _ in range(draw.choice((1, 1, 3))):
-            text = draw.choice((damage_text, damage_text, damage_lines, damage_bits))(draw, text)
+            text = draw.choice((damage_text, damage_text, damage_lines, damage_bits))(draw, text)[:2**22]  # memory
         encode = draw.choice(ENCODINGS) if draw.random() < 0.03 else lambda text: text.encode(errors="surrogateescape")
         file.write_bytes(encode(text))
         return
