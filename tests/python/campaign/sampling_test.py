@@ -130,19 +130,6 @@ def test_a_latin_hypercube_has_one_draw_in_each_stratum(tmp_path, runs):
         assert sorted(map(int, column)) == list(range(runs))
 
 
-def test_each_elementary_interval_holds_one_point_of_sobol(tmp_path):
-    """The first two coordinates are a (0, 2)-sequence in base 2: each block of 2^m points has one
-    in each of the 2^m boxes of width 2^-k and height 2^-(m-k)."""
-    m = 8
-    campaign = make(tmp_path, "  _x: { sobol: [0, 1], seed: 3 }\n  _y: { sobol: [0, 1], seed: 3 }",
-                    4 * 2**m)
-    for block in range(4):
-        points = np.array(make_values(campaign, block * 2**m, (block + 1) * 2**m - 1))
-        for k in range(m + 1):
-            boxes = (points * [2**k, 2 ** (m - k)]).astype(int)
-            assert len({tuple(box) for box in boxes.tolist()}) == 2**m
-
-
 # --- The generator, by its definition ------------------------------------------------------------
 
 def calc_philox(key, counter):
