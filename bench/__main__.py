@@ -98,12 +98,9 @@ def main() -> int:
 
             for file in save_plots(result, options.out):
                 say(f"plot: {file}")
-    except InputError as error:
+    except (InputError, RunError, OSError, ImportError) as error:
         say(f"error: {error}")
-        return 2
-    except (RunError, OSError, ImportError) as error:
-        say(f"error: {error}")
-        return 1
+        return 2 if isinstance(error, InputError) else 1
     return 0
 
 
