@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import sls
 from places import BUILD, ROOT, run_python
+from processes import wait_until
 
 # Noise on the measured state, and a delay of the command.
 FAULTS = [{"noise": {"on": "state", "position_m": [0.01, 0.02, 0.03], "seed": 7}},
@@ -299,8 +300,6 @@ def wait_for_work(pid):
         with open(f"/proc/{pid}/stat") as file:
             return int(file.read().rsplit(")", 1)[1].split()[11])
 
-    first, deadline = read_ticks(), time.monotonic() + 60
-    while read_ticks() < first + 10:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    first = read_ticks()
+    wait_until(lambda: read_ticks() >= first + 10, 60, "the flight works")
     return read_ticks()

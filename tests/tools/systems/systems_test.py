@@ -14,8 +14,9 @@ import unittest
 import unittest.mock
 
 ROOT = pathlib.Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "tools/systems"))
+sys.path[:0] = [str(ROOT / "tools/systems"), str(ROOT / "tests/support")]
 import tree  # noqa: E402
+from processes import wait_until  # noqa: E402
 LIMIT_S = 200  # for what takes seconds on an idle machine
 PROGRAMS = ("bash", "cat", "chroot", "env", "ls", "mkdir", "mount", "sh", "sleep", "touch", "true", "sed", "unshare")
 DEBOOTSTRAP = """#!/bin/sh
@@ -222,19 +223,13 @@ class SystemsTest(unittest.TestCase):
         self.wait_for_start()
         process.kill()
         process.communicate(timeout=LIMIT_S)
-        deadline = time.monotonic() + LIMIT_S
-        while self.find_processes() and time.monotonic() < deadline:
-            time.sleep(0.01)
-        self.assertEqual(self.find_processes(), [])
+        wait_until(lambda: not self.find_processes(), LIMIT_S, "no process is left")
         self.write_launcher(DEMO)
         self.assertEqual(self.run_systems("debian12", "--commands", "demo")[0], 0)
         self.expect_nothing_left()
 
     def wait_for_start(self):
-        deadline = time.monotonic() + LIMIT_S
-        while not (self.trees / "debian12/sls/started").exists():
-            self.assertLess(time.monotonic(), deadline)
-            time.sleep(0.01)
+        wait_until((self.trees / "debian12/sls/started").exists, LIMIT_S, "the demo starts")
 
     def find_processes(self):
         """Processes whose root is in a tree of this test."""
