@@ -13,8 +13,13 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from bench import instructions, loop, plant, start
-from bench.programs import MeasurementError, Programs, take_domain
+from bench.programs import DOMAINS, Programs
 from bench.results import Figure, format_table
+from sls.campaign.arguments import Parser
+from sls.dds_domain import own_domain
+from sls.errors import RunError
+from sls.input_error import InputError
+from sls.launcher.place import say
 
 Measure = Callable[[Programs, int, bool], list[Figure]]
 PARTS: dict[str, tuple[Measure, int]] = {  # int: number of rounds
@@ -25,19 +30,6 @@ PARTS: dict[str, tuple[Measure, int]] = {  # int: number of rounds
     "start": (start.measure_start, 9),
     "instructions": (instructions.measure_instructions, 1),
 }
-
-
-class UsageError(Exception):
-    pass
-
-
-class Parser(argparse.ArgumentParser):
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"bench: {message} (see ./sls bench --help)")
-
-
-def say(text: str) -> None:
-    print(f"sls: {text}", file=sys.stderr, flush=True)
 
 
 def parse_arguments() -> argparse.Namespace:
@@ -52,12 +44,12 @@ def parse_arguments() -> argparse.Namespace:
     parser.add_argument("--build", type=Path, required=True, help=argparse.SUPPRESS)
     options = parser.parse_args()
     if options.json and not options.json.resolve().parent.is_dir():
-        raise UsageError(f"--json {options.json}: expected a file in a folder that exists")
+        raise InputError(f"--json {options.json}: expected a file in a folder that exists")
     if options.out:
         try:
             options.out.mkdir(parents=True, exist_ok=True)
         except OSError as error:
-            raise UsageError(f"--out {options.out}: expected a folder, got: {error.strerror}") from None
+            raise InputError(f"--out {options.out}: expected a folder, got: {error.strerror}") from None
     return options
 
 
@@ -97,8 +89,7 @@ def measure(options: argparse.Namespace, programs: Programs) -> dict[str, Any]:
 def main() -> int:
     try:
         options = parse_arguments()
-        domain, lock = take_domain()
-        with lock, tempfile.TemporaryDirectory(prefix="sls-bench-") as scratch:
+        with own_domain(DOMAINS, "bench") as domain, tempfile.TemporaryDirectory(prefix="sls-bench-") as scratch:
             result = measure(options, Programs(options.build, domain, Path(scratch)))
         if options.json:
             options.json.write_text(json.dumps(result, indent=2) + "\n")
@@ -107,12 +98,9 @@ def main() -> int:
 
             for file in save_plots(result, options.out):
                 say(f"plot: {file}")
-    except UsageError as error:
+    except (InputError, RunError, OSError, ImportError) as error:
         say(f"error: {error}")
-        return 2
-    except (MeasurementError, OSError, ImportError) as error:
-        say(f"error: {error}")
-        return 1
+        return 2 if isinstance(error, InputError) else 1
     return 0
 
 

@@ -10,13 +10,13 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
-from bench.loop import without_recorder
-from bench.programs import MeasurementError, Programs
+from bench.programs import Programs
 from bench.results import LESS, Figure, format_lines
+from sls.errors import RunError
 
 STEPS = (2000, 4000)
 PERIOD_S = 0.001
-PLANTS = {"analytic": "  model: analytic", "slung_load": "  pendulum: ideal"}
+PLANTS = {"analytic": "model: analytic", "slung_load": "pendulum: ideal"}
 # Threads that a step wakes, without and with recorder. Server: the one that receives the answer
 # flies the step; another one writes the batches. Recorder: one receives, one writes the files.
 STEP_THREADS = {"sim_server": (1, 2), "control_client": (1, 1), "recorder": (0, 2)}
@@ -90,7 +90,7 @@ def read_threads(profile: Path) -> dict[str, Counter[Function]]:
         with file.open() as text:
             threads[file.name.removeprefix(profile.name)] = parse_profile(text)
     if not threads:
-        raise MeasurementError(f"{profile}: expected profiles of callgrind, got none")
+        raise RunError(f"{profile}: expected profiles of callgrind, got none")
     return threads
 
 
@@ -121,12 +121,7 @@ def count_flight(programs: Programs, plant: str, is_recorded: bool) -> dict[str,
     profiles: dict[tuple[str, int], Path] = {}
     commands = {}
     for domain, steps in enumerate(STEPS, programs.domain):
-        def change(text: str, steps: int = steps) -> str:
-            text = text.replace("for_s: 32", f"for_s: {steps * PERIOD_S:g}").replace(
-                PLANTS["slung_load"], PLANTS[plant])
-            return text if is_recorded else without_recorder(text)
-
-        scenario = programs.scenario("figure_eight", change)
+        scenario = programs.figure_eight(steps * PERIOD_S, is_recorded=is_recorded, plant=PLANTS[plant])
         started = programs.make_commands(scenario, programs.make_path("") if is_recorded else None, server=(
             "--period-s", str(PERIOD_S)), domain=domain)
         for name, command in started.items():

@@ -5,12 +5,12 @@ import csv
 import itertools
 import json
 import os
-from collections.abc import Callable
+import re
 from dataclasses import dataclass, replace
-from pathlib import Path
 
-from bench.programs import Flight, MeasurementError, Programs
+from bench.programs import Flight, Programs
 from bench.results import LESS, Figure, Rounds
+from sls.errors import RunError
 
 PERIOD_S = "0.001"
 TRANSPORTS = {"default": "shared memory", "udp": "UDP"}
@@ -20,15 +20,6 @@ WAITING = {True: "spinning", False: "blocking"}  # a thread that waits may spin 
 FUTEX_BOUND = ("1 / (plant step + control law + hand-over of two processes by futex, the fastest of "
                "spinning and blocking, on one processor and on two)")
 IN_PROCESS_BOUND = "1 / (plant step + control law)"
-
-
-def without_recorder(text: str) -> str:
-    return text.replace("recorders: 1", "recorders: 0")
-
-
-def lasting(seconds: float) -> Callable[[str], str]:
-    """Changes the duration of figure_eight.yaml to `seconds`."""
-    return lambda text: text.replace("for_s: 32", f"for_s: {seconds:g}")
 
 
 @dataclass(frozen=True)
@@ -49,15 +40,11 @@ LOOPS = tuple(Loop(*how) for how in itertools.product(TRANSPORTS, (False, True),
 
 
 def fly_lockstep(programs: Programs, loop: Loop, seconds: float) -> Flight:
-    def change(text: str) -> str:
-        text = lasting(seconds)(text)
-        return text if loop.is_recorded else without_recorder(text)
-
-    flight = programs.fly(programs.scenario("figure_eight", change), qos=loop.qos,
+    flight = programs.fly(programs.figure_eight(seconds, is_recorded=loop.is_recorded), qos=loop.qos,
                           is_recorded=loop.is_recorded, server=("--period-s", PERIOD_S),
                           may_spin=loop.may_spin)
     if loop.is_recorded and not flight.manifest["complete"]:
-        raise MeasurementError(f"{loop.qos}: the recording is not complete")
+        raise RunError(f"{loop.qos}: the recording is not complete")
     return flight
 
 
@@ -90,7 +77,7 @@ class StepCosts:
     def __init__(self, programs: Programs, is_quick: bool):
         self.programs = programs
         self.rounds = 2000 if is_quick else 20000
-        self.scenario = programs.scenario("figure_eight", lasting(2 if is_quick else 16))
+        self.scenario = programs.figure_eight(2 if is_quick else 16)
         self.work: dict[str, float] = {}
         self.futex: Times = {}
 
@@ -229,7 +216,7 @@ def measure_realtime(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
             def listen(stamps: list[str] = stamps) -> None:
                 stamps.append(programs.run_probe("stamps", "--domain", str(programs.domain)))
 
-            scenario = programs.scenario("figure_eight", lasting(seconds))
+            scenario = programs.figure_eight(seconds)
             timer = programs.run_probe("timer", "--period-s", str(period_s), "--seconds", str(seconds))
             flight = programs.fly(scenario, during=listen, server=(
                 "--mode", "realtime", "--rtf", "1", "--period-s", str(period_s)))
@@ -246,8 +233,6 @@ def measure_realtime(programs: Programs, rounds: int, is_quick: bool) -> list[Fi
 
 def count_late(label: str) -> float:
     """The number of late steps in a label: 3 in "real-time, 3 of 500 late, …" and "degraded: …, 3 of 500 late, …"."""
-    words = label.replace(",", " ").replace(";", " ").split()
-    for index in range(len(words) - 3):
-        if words[index + 1] == "of" and words[index + 3] == "late":
-            return float(words[index])
-    raise MeasurementError(f"expected a label with 'k of n late', got '{label}'")
+    if found := re.search(r"(\d+) of \d+ late", label):
+        return float(found[1])
+    raise RunError(f"expected a label with 'k of n late', got '{label}'")

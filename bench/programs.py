@@ -5,20 +5,17 @@ import json
 import os
 import re
 import signal
-import socket
 import subprocess
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sls.errors import RunError
+
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_S = 600.0  # of one flight; callgrind takes minutes
 DOMAINS = range(61, 81, 2)  # and the one after each; tests use the domains below 61
-
-
-class MeasurementError(Exception):
-    """A program did not do what the measurement needs."""
 
 
 @dataclass
@@ -37,18 +34,6 @@ class Flight:
         return {name: time * 1e6 / self.steps for name, time in self.processor_s.items()}
 
 
-def take_domain() -> tuple[int, socket.socket]:
-    """A DDS domain that, like the next one, no other bench uses as long as the socket exists."""
-    for domain in DOMAINS:
-        lock = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
-        try:
-            lock.bind(f"\0sls-bench-domain-{domain}")
-            return domain, lock
-        except OSError:
-            lock.close()
-    raise MeasurementError(f"expected a free DDS domain among {DOMAINS[0]} to {DOMAINS[-1]}, got none")
-
-
 START = ["setpriv", "--pdeathsig", "TERM", "--"]
 # The limit ends it after ten minutes of processor time, in case no program does.
 COUNTING = ["sh", "-c", "ulimit -t 600; while :; do n=$((n + 1)); done"]
@@ -65,9 +50,10 @@ class Programs:
         self.count += 1
         return self.scratch / f"{self.count}{suffix}"
 
-    def scenario(self, name: str, change: Callable[[str], str] = lambda text: text) -> Path:
-        """A changed copy of a shipped scenario."""
-        text = change((ROOT / "config/scenarios" / f"{name}.yaml").read_text())
+    def figure_eight(self, seconds: float = 32, *, is_recorded: bool = True, plant: str = "pendulum: ideal") -> Path:
+        """A changed copy of the shipped scenario."""
+        text = (ROOT / "config/scenarios/figure_eight.yaml").read_text().replace("for_s: 32", f"for_s: {seconds:g}")
+        text = text.replace("pendulum: ideal", plant).replace("recorders: 1", f"recorders: {is_recorded:d}")
         path = self.make_path(".yaml")
         path.write_text(text)
         return path
@@ -90,11 +76,10 @@ class Programs:
             done = subprocess.run([*START, *command], capture_output=True, text=True,
                                   timeout=LONGEST_S, check=False)
         except subprocess.TimeoutExpired:
-            raise MeasurementError(f"{' '.join(command)}: expected an end within {LONGEST_S:.0f} s"
-                                   ) from None
+            raise RunError(f"{' '.join(command)}: expected an end within {LONGEST_S:.0f} s") from None
         if done.returncode != 0:
-            raise MeasurementError(f"{' '.join(command)}: ended with {done.returncode}: "
-                                   f"{done.stderr.strip() or done.stdout.strip()}")
+            raise RunError(f"{' '.join(command)}: ended with {done.returncode}: "
+                           f"{done.stderr.strip() or done.stdout.strip()}")
         return done.stdout
 
     def run_probe(self, subcommand: str, *words: str | Path) -> str:
@@ -145,7 +130,7 @@ class Programs:
         said = {name: log.read_text() for name, log in logs.items()}
         for name, process in processes.items():
             if process.returncode != 0:
-                raise MeasurementError(f"{name} ended with {process.returncode}: {said[name].strip()}")
+                raise RunError(f"{name} ended with {process.returncode}: {said[name].strip()}")
         return processor_s, said
 
     def fly(self, scenario: Path, *, qos: str = "default", is_recorded: bool = True,
@@ -158,7 +143,7 @@ class Programs:
         processor_s, said = self.run_together(commands, during=during, may_spin=may_spin)
         found = re.search(r"finished: (\d+) steps, .*, (\d+) steps/s, \d+ resent, (.*)", said["sim_server"])
         if not found:
-            raise MeasurementError(f"sim_server: expected a last line with steps/s, got: {said['sim_server']}")
+            raise RunError(f"sim_server: expected a last line with steps/s, got: {said['sim_server']}")
         manifest = json.loads((recording / "manifest.json").read_text()) if recording else {}
         return Flight(int(found[1]), float(found[2]), found[3].strip(), processor_s, manifest)
 

@@ -4,8 +4,9 @@ import re
 import time
 from pathlib import Path
 
-from bench.programs import ROOT, MeasurementError, Programs
+from bench.programs import ROOT, Programs
 from bench.results import LESS, Figure, Rounds
+from sls.errors import RunError
 
 SHORT_STEPS = 100
 
@@ -26,14 +27,13 @@ def run_launcher(programs: Programs, *words: str | Path) -> tuple[float, float, 
     wall_s, processor_s, said = time_together(programs, {"sls": command})
     flight = re.search(r"simulated in ([\d.]+) s", said["sls"])
     if not flight:
-        raise MeasurementError(f"sls run: expected the time of the flight, got: {said['sls']}")
+        raise RunError(f"sls run: expected the time of the flight, got: {said['sls']}")
     return wall_s, processor_s, float(flight[1])
 
 
 def measure_start(programs: Programs, rounds: int, is_quick: bool) -> list[Figure]:
-    short = programs.scenario(
-        "figure_eight", lambda text: re.sub(r"for_s: [\d.]+", f"for_s: {SHORT_STEPS * 0.004}", text))
-    eight = short if is_quick else programs.scenario("figure_eight")
+    short = programs.figure_eight(SHORT_STEPS * 0.004)
+    eight = short if is_quick else programs.figure_eight()
     figures = Rounds("start")
     for _ in range(rounds):
         wall_s, processor_s, _ = run_launcher(programs, short)

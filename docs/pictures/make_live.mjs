@@ -1,35 +1,23 @@
-// Makes docs/pictures/live.png, a flight on its page: flies figure_eight with `./sls run --view`, pauses it on the
-// second lap by the button of the page, and takes the picture in headless Chromium.
+// Makes docs/pictures/live.png, a flight on its page: flies figure_eight, pauses it on the second lap by the button of
+// the page, and takes the picture in headless Chromium.
 //
-//     npm ci --prefix tests/tools/view && node docs/pictures/make_live.mjs [DOMAIN]
-import { spawn } from "node:child_process";
-import { mkdtempSync, rmSync, statSync } from "node:fs";
-import { tmpdir } from "node:os";
-import { dirname, join } from "node:path";
+//     ./sls build && npm ci --prefix tests/tools/view && node docs/pictures/make_live.mjs
 import { fileURLToPath } from "node:url";
-import { startBrowser, waitFor } from "../../tests/tools/view/page/browser.mjs";
+import { startFlight } from "../../tests/tools/view/flight.mjs";
+import { open, startBrowser, waitFor } from "../../tests/tools/view/page/browser.mjs";
 
-const root = join(dirname(fileURLToPath(import.meta.url)), "../..");
-const picture = join(root, "docs/pictures/live.png");
-const domain = process.argv[2] ?? "0";
+const picture = fileURLToPath(new URL("live.png", import.meta.url));
 const kPauseTime = 17; // s of simulated time: on the second lap
-const kMostBytes = 300_000;
 
-const folder = mkdtempSync(join(tmpdir(), "sls-picture-"));
-const flight = spawn(join(root, "sls"), ["run", "figure_eight", "--mode", "realtime", "--rtf", "0.5", "--view-port", "0",
-                                         "--domain", domain, "--out", join(folder, "recording")],
-                     { stdio: ["ignore", "inherit", "pipe"] });
-let log = "";
-flight.stderr.on("data", (data) => (log += data));
-const ended = new Promise((resolve) => flight.once("exit", resolve));
-const chromium = await startBrowser({ width: 1280, height: 720, scheme: "light" });
-const { page } = chromium;
+const flight = await startFlight({ rtf: 0.5 });
+const chromium = await startBrowser();
 try {
-  const url = await waitFor("the address of the page", () => /page: (http:\S+)/.exec(log)?.[1], 600_000);
+  const { url } = await flight.startViewer("--recording", `${flight.folder}/recording`);
+  const { page } = await open(chromium.browser, { width: 1280, height: 720, scheme: "light" });
   await page.goto(url);
   const state = () => page.evaluate(() => window.slsView.state());
   await waitFor("the second lap", async () => ((await state()).sim_time_s ?? 0) > kPauseTime, 90_000);
-  await page.click("[data-action=pause]");
+  await page.$eval("[data-action=pause]", (button) => button.click());
   await waitFor("the pause", async () => (await state()).phase === "paused");
   await page.click("#fit");
   await page.focus("#scene");
@@ -43,15 +31,7 @@ try {
   });
   await page.evaluate(() => document.activeElement.blur());
   await page.screenshot({ path: picture });
-} catch (error) {
-  process.stderr.write(log);
-  throw error;
 } finally {
   await chromium.stop();
-  if (flight.exitCode === null) flight.kill("SIGTERM");
-  await ended;
-  rmSync(folder, { recursive: true, force: true });
+  await flight.stop();
 }
-const bytes = statSync(picture).size;
-if (bytes > kMostBytes) throw new Error(`${picture}: expected at most ${kMostBytes} bytes, got ${bytes}`);
-console.log(`${picture}: ${bytes} bytes`);

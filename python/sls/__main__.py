@@ -168,12 +168,9 @@ def main(arguments: Sequence[str]) -> int:
     try:
         options = make_parser().parse_args(arguments)
         options.run(options)
-    except (ConfigError, ImportError) as error:
+    except (ConfigError, ImportError, RunError) as error:
         say(f"error: {error}")
-        return 2
-    except RunError as error:
-        say(f"error: {error}")
-        return 1
+        return 1 if isinstance(error, RunError) else 2
     return 0
 
 

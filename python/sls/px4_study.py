@@ -1,14 +1,13 @@
 """The study's chapter on the published PX4 flight: its flights, pictures, tables and numbers. All flights of the study
 are flown here, each in one process (`./sls run --in-process`)."""
 
-import copy
 import math
 import os
 import re
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,74 +23,48 @@ from sls.errors import RunError
 from sls.input_error import InputError
 from sls.metrics import StageMetrics, calc_over, split_laps
 from sls.recordings import Recording
-from sls.scenario import ROOT, SHIPPED
+from sls.scenario import ROOT, SHIPPED, load_scenario
 from sls.tables import format_error, list_error_cells, make_markdown_table
-
-Change = Callable[[dict[str, Any]], None]
-
 
 @dataclass(frozen=True)
 class Planned:
-    """A flight of the shipped scenario `base`, with `changes` and, if given, another control period."""
+    """A flight of the shipped scenario `base`, with `changes` by key and, if given, another control period."""
 
     name: str
     base: str
-    changes: tuple[Change, ...] = ()
+    changes: Mapping[str, Any] = field(default_factory=dict)
     period_s: float | None = None
 
 
 # --- changes of scenarios -------------------------------------------------------------------------
 
-
-def use_right_gains(scenario: dict[str, Any]) -> None:
-    scenario["controller"]["gains"] = {"lqr": {"horizontal": 10, "vertical": 5}}
-
-
-def use_exact_thrust(scenario: dict[str, Any]) -> None:
-    scenario["autopilot"]["thrust_map"] = "exact"
-
-
-def see_at_once(scenario: dict[str, Any]) -> None:
-    del scenario["sensing"]
-
-
-def lose_no_thrust(scenario: dict[str, Any]) -> None:
-    del scenario["plant"]["rotor"]["thrust_loss_speed_m_s"]
-
-
-def lag_first_order(lag_s: float) -> Change:
-    def change(scenario: dict[str, Any]) -> None:
-        scenario["autopilot"] = {"model": "first_order", "lag_s": lag_s}
-    return change
-
-
-def delay_command(by_s: float) -> Change:
-    def change(scenario: dict[str, Any]) -> None:
-        scenario["faults"] = [{"delay": {"on": "command", "by_s": by_s}}]
-    return change
-
-
+RIGHT_GAINS = {"controller.gains": {"lqr": {"horizontal": 10, "vertical": 5}}}
+EXACT_THRUST = {"autopilot.thrust_map": "exact"}
+SEEN_AT_ONCE = {"sensing": {}}
+STEP_GENTLY = {"plant.initial": {"load_position_m": [0, 0, -0.5]},
+               "mission": [{"set_point": {"position_m": [0.2, 0.2, -0.5]}, "for_s": 60}]}
 STEP_AT_S, STEP_RAD = 2.0, 0.1
 TIME_CONSTANT_SHARE = 1.0 - math.exp(-1.0)
 
 
-def step_force(axis: int, sign: float) -> Change:
+def lag_first_order(lag_s: float) -> dict[str, Any]:
+    return {"autopilot": {"model": "first_order", "lag_s": lag_s}}
+
+
+def step_force(base: str, axis: int, sign: float) -> dict[str, Any]:
     """A step of the force on a load at rest. The command is frozen, because the controller must not
     react to the step."""
-    def change(scenario: dict[str, Any]) -> None:
-        vehicle = scenario["vehicle"]
-        weight = (vehicle["quad_mass_kg"] + vehicle["load_mass_kg"]) * vehicle["gravity_m_s2"]
-        force = [0.0, 0.0, 0.0]
-        force[axis] = sign * weight * math.tan(STEP_RAD)
-        scenario["faults"] = [{"freeze": {"on": "command", "from_s": 1.0}},
-                              {"bias": {"on": "command", "force_n": force, "from_s": STEP_AT_S}}]
-        scenario["mission"] = [{"hold": {"position_m": [1, 2, -3]}, "for_s": STEP_AT_S + 1.2}]
-    return change
+    vehicle = load_base(base)["vehicle"]
+    weight = (vehicle["quad_mass_kg"] + vehicle["load_mass_kg"]) * vehicle["gravity_m_s2"]
+    force = [0.0, 0.0, 0.0]
+    force[axis] = sign * weight * math.tan(STEP_RAD)
+    return {"faults": [{"freeze": {"on": "command", "from_s": 1.0}},
+                       {"bias": {"on": "command", "force_n": force, "from_s": STEP_AT_S}}],
+            "mission": [{"hold": {"position_m": [1, 2, -3]}, "for_s": STEP_AT_S + 1.2}]}
 
 
-def step_gently(scenario: dict[str, Any]) -> None:
-    scenario["plant"]["initial"] = {"load_position_m": [0, 0, -0.5]}
-    scenario["mission"] = [{"set_point": {"position_m": [0.2, 0.2, -0.5]}, "for_s": 60}]
+def load_base(name: str) -> dict[str, Any]:
+    return yaml.safe_load((SHIPPED / f"{name}.yaml").read_text())
 
 
 # --- flights --------------------------------------------------------------------------------------
@@ -111,47 +84,45 @@ INGREDIENTS = (
 ATTITUDE_LAG_S = 0.154
 
 BOUGHT = (
-    (Planned("fitted_exact_thrust", "px4_fitted", (use_exact_thrust,)), "exact thrust map"),
-    (Planned("fitted_fresh", "px4_fitted", (see_at_once,)), "no delay of states and command"),
-    (Planned("fitted_exact_fresh", "px4_fitted", (use_exact_thrust, see_at_once)), "both"),
-    (Planned("published_exact_fresh", "px4_published", (use_exact_thrust, see_at_once)),
-     "both, and no tilt and yaw error"),
-    (Planned("fitted_right_gains", "px4_fitted", (use_right_gains,)), "gains in the right order"),
-    (Planned("fitted_exact_fresh_right_gains", "px4_fitted",
-             (use_exact_thrust, see_at_once, use_right_gains)),
+    (Planned("fitted_exact_thrust", "px4_fitted", EXACT_THRUST), "exact thrust map"),
+    (Planned("fitted_fresh", "px4_fitted", SEEN_AT_ONCE), "no delay of states and command"),
+    (Planned("fitted_exact_fresh", "px4_fitted", EXACT_THRUST | SEEN_AT_ONCE), "both"),
+    (Planned("published_exact_fresh", "px4_published", EXACT_THRUST | SEEN_AT_ONCE), "both, and no tilt and yaw error"),
+    (Planned("fitted_right_gains", "px4_fitted", RIGHT_GAINS), "gains in the right order"),
+    (Planned("fitted_exact_fresh_right_gains", "px4_fitted", EXACT_THRUST | SEEN_AT_ONCE | RIGHT_GAINS),
      "exact thrust map, no delays, gains in the right order"),
-    (Planned("fitted_first_order", "px4_fitted", (lag_first_order(ATTITUDE_LAG_S),)),
+    (Planned("fitted_first_order", "px4_fitted", lag_first_order(ATTITUDE_LAG_S)),
      f"a lag of {ATTITUDE_LAG_S} s for rotors and attitude loop, exact thrust"),
 )
 """Flights of px4_fitted with changes, each with a description."""
 
-WITHOUT_LOSS = Planned("attitude_without_thrust_loss", "px4_attitude", (lose_no_thrust,))
+WITHOUT_LOSS = Planned("attitude_without_thrust_loss", "px4_attitude",
+                       {"plant.rotor.thrust_loss_speed_m_s": 0})
 
 DELAYS_S = (0.0, 0.04, 0.08, 0.12, 0.16, 0.2)
 LAGS_S = (0.05, 0.1, ATTITUDE_LAG_S)
-GAINS = (("reversed", ()), ("right", (use_right_gains,)))
+GAINS = (("reversed", {}), ("right", RIGHT_GAINS))
 LATE = tuple((gains, Lateness(delay_s=delay_s),
               Planned(f"ideal_{gains}_delay_{1000 * delay_s:.0f}ms", "px4_ideal",
-                      (*changes, delay_command(delay_s))))
+                      changes | {"faults": [{"delay": {"on": "command", "by_s": delay_s}}]}))
              for gains, changes in GAINS for delay_s in DELAYS_S) + tuple(
     (gains, Lateness(lag_s=lag_s),
      Planned(f"ideal_{gains}_lag_{1000 * lag_s:.0f}ms", "px4_ideal",
-             (*changes, lag_first_order(lag_s))))
+             changes | lag_first_order(lag_s)))
     for gains, changes in GAINS for lag_s in LAGS_S)
 """Gains, lateness of the force, and the flight."""
 
-STEPS = (("roll", 0, Planned("attitude_step_roll", "px4_attitude", (step_force(1, 1.0),))),
-         ("pitch", 1, Planned("attitude_step_pitch", "px4_attitude", (step_force(0, -1.0),))))
+STEPS = (("roll", 0, Planned("attitude_step_roll", "px4_attitude", step_force("px4_attitude", 1, 1.0))),
+         ("pitch", 1, Planned("attitude_step_pitch", "px4_attitude", step_force("px4_attitude", 0, -1.0))))
 """Name and index of the angle, and the flight. A force to the right gives roll, a force backwards pitch."""
 
 MARGINS = tuple(
-    (vehicle, gains, mission, Planned(f"margin_{vehicle}_{gains}{suffix}", vehicle,
-                                      (*gain_changes, *changes)))
+    (vehicle, gains, mission, Planned(f"margin_{vehicle}_{gains}{suffix}", vehicle, gain_changes | changes))
     for vehicle, mission, suffix, changes in (
-        ("px4_ideal", "the eight", "", ()),
-        ("px4_attitude", "the eight", "", ()),
-        ("px4_attitude", "a step of 0.2 m", "_step", (step_gently,)),
-        ("px4_fitted", "a step of 0.2 m", "_step", (step_gently,)))
+        ("px4_ideal", "the eight", "", {}),
+        ("px4_attitude", "the eight", "", {}),
+        ("px4_attitude", "a step of 0.2 m", "_step", STEP_GENTLY),
+        ("px4_fitted", "a step of 0.2 m", "_step", STEP_GENTLY))
     for gains, gain_changes in GAINS)
 """Vehicle, gains, mission in words, and the scenario whose delay margin is searched."""
 
@@ -164,20 +135,12 @@ class RunFailed(RunError):
     """A flight or a search for a delay margin failed; the message names it."""
 
 
-def load_base(name: str) -> dict[str, Any]:
-    return yaml.safe_load((SHIPPED / f"{name}.yaml").read_text())
-
-
 def find_scenario(planned: Planned, recordings: Path) -> Path:
     """The scenario file: the shipped one, or, with changes, a new one below `recordings`."""
     if not planned.changes:
         return SHIPPED / f"{planned.base}.yaml"
-    scenario = copy.deepcopy(load_base(planned.base))
-    scenario["name"] = planned.name
-    for change in planned.changes:
-        change(scenario)
     path = recordings / "scenarios" / f"{planned.name}.yaml"
-    path.write_text(yaml.safe_dump(scenario, sort_keys=False))
+    path.write_text(load_scenario(planned.base, changes={"name": planned.name, **planned.changes}).text)
     return path
 
 

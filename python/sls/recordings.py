@@ -97,12 +97,12 @@ class Comparison:
         return self.difference is None
 
 
-@dataclass(frozen=True)
 class RecordedVehicle(VehicleColumns):
     """The columns of one vehicle, read on first use."""
 
-    recording: "Recording"
-    vehicle_id: int
+    def __init__(self, recording: "Recording", vehicle_id: int):
+        self.recording = recording
+        self.vehicle_id = vehicle_id
 
     @cached_property
     def state(self) -> Columns:
@@ -137,7 +137,7 @@ class RecordedVehicle(VehicleColumns):
         return self.recording.rows_of(name, self.vehicle_id)
 
 
-class Recording(VehicleColumns):
+class Recording(RecordedVehicle):
     """A recording's folder. `state`, `measured`, `command` and `reference` are the columns of the
     files with these names, for the first vehicle; `vehicle(ID)` has those of another vehicle. Arrays
     have a row for each row of the file, SI units, radians. Every member raises InputError, which is a
@@ -152,6 +152,11 @@ class Recording(VehicleColumns):
             if not (segment / "manifest.json").exists():
                 break  # its recorder was killed before it wrote a file
             self.segments.append((segment, read_manifest(segment)))
+        self.vehicle_id = self.vehicle_ids[0]
+
+    @property
+    def recording(self) -> "Recording":  # a kept cycle of references would keep the memory
+        return self
 
     @property
     def manifest(self) -> dict[str, Any]:
@@ -168,34 +173,9 @@ class Recording(VehicleColumns):
         return str(self.manifest.get("certificate", ""))
 
     def vehicle(self, vehicle_id: int) -> RecordedVehicle:
-        """The columns of one vehicle; always the same object."""
+        """The columns of one vehicle; always the same object, of the first vehicle the recording itself."""
         self._check_vehicle(vehicle_id)
-        return self._vehicles.setdefault(vehicle_id, RecordedVehicle(self, vehicle_id))
-
-    @property
-    def _first(self) -> RecordedVehicle:
-        return self.vehicle(self.vehicle_ids[0])
-
-    @property
-    def state(self) -> Columns:
-        return self._first.state
-
-    @property
-    def measured(self) -> Columns:
-        return self._first.measured
-
-    @property
-    def command(self) -> Columns:
-        return self._first.command
-
-    @property
-    def reference(self) -> Columns:
-        return self._first.reference
-
-    @cached_property
-    def trajectory(self) -> Trajectory:
-        """The first vehicle's flight, for figures and metrics."""
-        return self._first.trajectory
+        return self if vehicle_id == self.vehicle_id else self._vehicles.setdefault(vehicle_id, RecordedVehicle(self, vehicle_id))
 
     def __repr__(self) -> str:
         manifest = self.manifest

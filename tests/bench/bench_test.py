@@ -1,6 +1,7 @@
 """Tests of `./sls bench`: its arithmetic on given numbers, its output and files, and its error messages. No test
 judges a speed."""
 
+import importlib.util
 import json
 import os
 import pathlib
@@ -17,8 +18,9 @@ from processes import wait_until
 
 sys.path.insert(0, str(ROOT))
 from bench import instructions, loop  # noqa: E402
-from bench.programs import MeasurementError, Programs  # noqa: E402
+from bench.programs import Programs  # noqa: E402
 from bench.results import LESS, Figure, Rounds, format_number, format_table  # noqa: E402
+from sls.errors import RunError  # noqa: E402
 
 GOOGLE_BENCHMARK = BUILD / "bin/sls_microbench"
 
@@ -180,7 +182,7 @@ class DistributionTest(unittest.TestCase):
         self.assertEqual(loop.count_late("real-time, 3 of 500 late, worst age 4 ms"), 3)
         self.assertEqual(loop.count_late("degraded: real-time, 7 of 500 late, worst age 8 ms, "
                                          "1 s lost in 2 slips"), 7)
-        with self.assertRaises(loop.MeasurementError):
+        with self.assertRaises(RunError):
             loop.count_late("exact")
 
 
@@ -253,7 +255,7 @@ class ProcessTest(FolderTest):
                   "with programs.busy_loops(1) as counting:\n"
                   "    print(counting[0].pid, flush=True)\n    signal.pause()\n")
         with subprocess.Popen([sys.executable, "-c", script, self.programs.scratch], text=True,
-                              stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": str(ROOT)}
+                              stdout=subprocess.PIPE, env={**os.environ, "PYTHONPATH": f"{ROOT}:{ROOT}/python"}
                               ) as process:
             counting = pathlib.Path(f"/proc/{int(process.stdout.readline())}")
             wait_until(lambda: (counting / "comm").read_text() == "sh\n", 30, "setpriv has started the shell")
@@ -271,7 +273,7 @@ class ProcessTest(FolderTest):
         self.assertEqual(said, {"burns": "", "says": "1\n"})
 
     def test_a_program_that_does_not_end_well_is_an_error(self):
-        with self.assertRaisesRegex(MeasurementError, "^fails ended with 3: why$"):
+        with self.assertRaisesRegex(RunError, "^fails ended with 3: why$"):
             self.programs.run_together({"fails": ["sh", "-c", "echo why; exit 3"], "sleeps": ["sleep", "0.5"]})
 
 
@@ -290,7 +292,10 @@ class ProgramTest(FolderTest):
         for part in ("lockstep", "load", "realtime", "plant", "start", "instructions"):
             self.assertIn(part, said)
 
-    def check(self, file, part):
+    def measure(self, part, *words):
+        """The figures of a quick run, and what it printed."""
+        file = self.folder / "bench.json"
+        said = launch("bench", "--quick", "--only", part, "--json", file, *words, timeout=600)
         result = json.loads(file.read_text())
         self.assertTrue(result["quick"])
         self.assertGreaterEqual(result["machine"]["cores"], 1)
@@ -300,29 +305,20 @@ class ProgramTest(FolderTest):
             self.assertLessEqual(figure["median"], figure["max"])
             if "ratio" in figure:
                 self.assertGreater(figure["ratio"]["min"], 0)
-        return result["figures"]
+        return result["figures"], said.stdout
 
     def test_a_quick_start_part_measures_a_short_flight_with_the_launcher_and_without(self):
-        file = self.folder / "bench.json"
-        launch("bench", "--quick", "--only", "start", "--json", file, timeout=600)
-        figures = {figure["name"]: figure for figure in self.check(file, "start")}
+        figures = {figure["name"]: figure for figure in self.measure("start")[0]}
         self.assertEqual({figure["goal"]["value"] for figure in figures.values() if "goal" in figure},
                          {0.8, 0.7, 0.6, 0.9})
         self.assertEqual(len(figures), 5)
         self.assertTrue(all(0 < figure["min"] < 60 for figure in figures.values()))
 
     def test_a_quick_lockstep_part_has_bounds_a_table_and_a_plot(self):
-        file = self.folder / "bench.json"
-        words = ["--quick", "--only", "lockstep", "--json", file]
-        try:
-            import matplotlib  # noqa: F401
-            words += ["--out", self.folder / "plots"]
-        except ImportError:
-            pass
-        said = launch("bench", *words, timeout=600)
-        figures = self.check(file, "lockstep")
-        self.assertIn("shared memory, with recorder", said.stdout)
-        self.assertIn("where a step goes", said.stdout)
+        has_plots = importlib.util.find_spec("matplotlib") is not None
+        figures, table = self.measure("lockstep", *["--out", self.folder / "plots"] * has_plots)
+        self.assertIn("shared memory, with recorder", table)
+        self.assertIn("where a step goes", table)
         loops = [figure for figure in figures if "rest" in figure.get("parts_us", {})]
         self.assertEqual([figure["name"] for figure in loops], [how.name for how in loop.LOOPS])
         for figure in loops:
@@ -337,26 +333,20 @@ class ProgramTest(FolderTest):
         one = names["one process, without files"]
         for name in futex:  # a round includes all the work of a step; 0.1 % for rounding
             self.assertLess(names[name]["median"], 1.001 * one["bound"]["median"])
-        if "--out" in words:
+        if has_plots:
             self.assertTrue((self.folder / "plots/lockstep.png").read_bytes().startswith(b"\x89PNG"))
             self.assertIn("<svg", (self.folder / "plots/lockstep.svg").read_text())
 
     def test_a_quick_load_part_compares_with_no_load_and_with_no_spinning(self):
-        file = self.folder / "bench.json"
-        launch("bench", "--quick", "--only", "load", "--json", file, timeout=600)
-        names = [figure["name"] for figure in self.check(file, "load") if "ratio" in figure]
+        names = [figure["name"] for figure in self.measure("load")[0] if "ratio" in figure]
         self.assertEqual(sum("1 busy loop" in name for name in names), 3)
         self.assertEqual(sum("beside blocking" in name for name in names), 2)
 
     def test_a_quick_realtime_part_stands_beside_a_thread_that_only_sleeps(self):
-        file = self.folder / "bench.json"
-        launch("bench", "--quick", "--only", "realtime", "--json", file, timeout=600)
-        late = [figure for figure in self.check(file, "realtime") if "ratio" in figure]
+        late = [figure for figure in self.measure("realtime")[0] if "ratio" in figure]
         self.assertEqual(len(late), 2 * len(loop.PERCENTILES))
 
     @unittest.skipUnless(GOOGLE_BENCHMARK.exists(), "skipped: libbenchmark-dev is missing")
     def test_a_quick_plant_part_compares_with_the_closed_form(self):
-        file = self.folder / "bench.json"
-        launch("bench", "--quick", "--only", "plant", "--json", file, timeout=600)
-        ratios = [figure for figure in self.check(file, "plant") if "ratio" in figure]
+        ratios = [figure for figure in self.measure("plant")[0] if "ratio" in figure]
         self.assertEqual(len(ratios), 4)  # 1, 2, 10 and 100 vehicles

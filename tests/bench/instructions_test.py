@@ -14,10 +14,11 @@ import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "python")]
 
 from bench.instructions import count_flight, count_without_waits  # noqa: E402
-from bench.programs import Programs, take_domain  # noqa: E402
+from bench.programs import DOMAINS, Programs  # noqa: E402
+from sls.dds_domain import own_domain  # noqa: E402
 
 BUILD = pathlib.Path(sys.argv.pop(1)).resolve()
 FIGURES = pathlib.Path(__file__).with_name("instructions.json")  # by version of Fast DDS
@@ -56,8 +57,7 @@ def find_obstacle() -> str:
 
 
 def measure() -> dict[str, int]:
-    domain, lock = take_domain()
-    with lock, tempfile.TemporaryDirectory() as scratch:
+    with own_domain(DOMAINS, "bench") as domain, tempfile.TemporaryDirectory() as scratch:
         counted = count_flight(Programs(BUILD, domain, pathlib.Path(scratch)), "analytic", True)
     return {name: count_without_waits(functions) for name, functions in counted.items()}
 

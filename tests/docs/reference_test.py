@@ -1,13 +1,11 @@
-"""docs/reference equals the help texts of the built programs; the man pages are well formed.
-"""
+"""docs/reference equals the help texts of the built programs; the man pages are well formed."""
 
-import pathlib
 import re
 import subprocess
-import tempfile
 import unittest
 
 import yaml
+from folder_test import FolderTest
 from places import BUILD, ROOT
 
 
@@ -48,14 +46,13 @@ class Reference(unittest.TestCase):
                 self.assertIn(path, named, file.name)
 
 
-class ManPages(unittest.TestCase):
+class ManPages(FolderTest):
     def test_are_well_formed(self):
-        with tempfile.TemporaryDirectory() as folder:
-            done = run_reference("--man", folder)
-            self.assertEqual(done.returncode, 0, done.stderr)
-            pages = sorted(pathlib.Path(folder).iterdir())
-            names = [page.name for page in pages]
-            self.assertIn("sls.1", names)
-            self.assertIn("sim_server.1", names)
-            for page in pages:
-                self.assertEqual(lint(page), "", page.name)
+        done = run_reference("--man", self.folder)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        pages = sorted(self.folder.iterdir())
+        names = [page.name for page in pages]
+        self.assertIn("sls.1", names)
+        self.assertIn("sim_server.1", names)
+        for page in pages:
+            self.assertEqual(lint(page), "", page.name)

@@ -5,16 +5,13 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import yaml
+from own_domain import own_domain
+from places import BUILD, ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
-BUILD = Path(os.environ.get("SLS_BUILD", ROOT / "build"))
-sys.path.append(str(ROOT / "tests/support"))
-from own_domain import own_domain  # noqa: E402
 
 @pytest.fixture(scope="module")
 def prefix(tmp_path_factory):

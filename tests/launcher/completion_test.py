@@ -1,16 +1,14 @@
 """tools/completion/sls.bash completes command lines in bash with the launcher's commands and the files in folders."""
 
 import os
-import pathlib
 import pty
 import select
 import shutil
 import subprocess
-import tempfile
 import time
-import unittest
 
 import checkout
+from folder_test import FolderTest
 from places import ROOT
 from sls.launcher import completion
 from sls.launcher.commands import COMMANDS
@@ -37,7 +35,7 @@ def list_names(folder):
     return {file.stem for file in (ROOT / "config" / folder).glob("*.yaml")}
 
 
-class Completion(unittest.TestCase):
+class Completion(FolderTest):
     def test_knows_every_command_of_the_launcher(self):
         self.assertEqual(set(complete("./sls", "")), set(COMMANDS))
         self.assertEqual(complete("./sls", "ru"), ["run"])
@@ -73,18 +71,17 @@ class Completion(unittest.TestCase):
         self.assertEqual(complete("./sls", "verify", "conf"), ["config"])
 
     def test_offers_what_an_installed_launcher_finds(self):
-        with tempfile.TemporaryDirectory() as folder:
-            root = pathlib.Path(folder) / "share/sls"
-            for name in ("sls", "python/sls/__init__.py", "python/sls/launcher"):
-                checkout.copy(name, root)
-            (root / "config/scenarios").mkdir(parents=True)
-            (root / "config/scenarios/installed_one.yaml").touch()
-            self.assertEqual(complete(root / "sls", "run", "installed", folder=folder), ["installed_one"])
-            self.assertEqual(complete(root / "sls", "run", "--mo"), [])
-            page = root.parent / "doc/sls/docs/reference/commands.md"
-            page.parent.mkdir(parents=True)
-            shutil.copy(ROOT / "docs/reference/commands.md", page)
-            self.assertEqual(complete(root / "sls", "run", "--mo"), ["--mode"])
+        root = self.folder / "share/sls"
+        for name in ("sls", "python/sls/__init__.py", "python/sls/launcher"):
+            checkout.copy(name, root)
+        (root / "config/scenarios").mkdir(parents=True)
+        (root / "config/scenarios/installed_one.yaml").touch()
+        self.assertEqual(complete(root / "sls", "run", "installed", folder=self.folder), ["installed_one"])
+        self.assertEqual(complete(root / "sls", "run", "--mo"), [])
+        page = root.parent / "doc/sls/docs/reference/commands.md"
+        page.parent.mkdir(parents=True)
+        shutil.copy(ROOT / "docs/reference/commands.md", page)
+        self.assertEqual(complete(root / "sls", "run", "--mo"), ["--mode"])
 
     def test_answers_at_once_and_builds_and_installs_nothing(self):
         def complete_run():

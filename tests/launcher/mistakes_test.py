@@ -14,11 +14,10 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
-import unittest
 
 import checkout
+from folder_test import FolderTest
 from own_domain import own_domain
 from places import ROOT, launch
 from sls import __version__
@@ -135,7 +134,7 @@ class MistakesTest(checkout.CheckoutTest):
         self.assertEqual([name for name in FOREIGN if not completion.read_options(name)], [])
 
 
-class AnswersTest(unittest.TestCase):
+class AnswersTest(FolderTest):
     """What the launcher says itself, with the programs of the build."""
 
     def test_the_version_is_that_of_cmake(self):
@@ -168,28 +167,26 @@ class AnswersTest(unittest.TestCase):
         os.close(theirs)
 
     def test_two_flights_that_differ_because_of_their_scenarios_are_named_so(self):
-        with tempfile.TemporaryDirectory() as folder:
-            for name in ("short", "mission"):
-                launch("run", name, "--in-process", "--out", name, cwd=folder)
-            done = launch("verify", "short", "mission", cwd=folder, code=1)
+        for name in ("short", "mission"):
+            launch("run", name, "--in-process", "--out", name, cwd=self.folder)
+        done = launch("verify", "short", "mission", cwd=self.folder, code=1)
         self.assertEqual(done.stderr, "sls_verify: error: A and B are flights of different scenarios\n")
         self.assertNotIn("largest difference", done.stdout)
 
     def test_the_summary_for_machines_is_one_line_of_json(self):
-        with tempfile.TemporaryDirectory() as folder:
-            said = launch("run", "short", "--in-process", "--json", "--out", "r", cwd=folder).stdout
-            summary = json.loads(said)
-            manifest = json.loads(pathlib.Path(folder, "r/manifest.json").read_text())
+        said = launch("run", "short", "--in-process", "--json", "--out", "r", cwd=self.folder).stdout
+        summary = json.loads(said)
+        manifest = json.loads((self.folder / "r/manifest.json").read_text())
         self.assertEqual(said.count("\n"), 1)
         self.assertEqual((summary["exit_code"], summary["recording"], summary["complete"]), (0, "r", True))
         self.assertEqual(summary["certificate"], manifest["certificate"])
 
     def test_a_flight_in_real_time_shows_its_progress_on_a_terminal(self):
-        with tempfile.TemporaryDirectory() as folder, own_domain() as domain:
+        with own_domain() as domain:
             ours, theirs = pty.openpty()
             process = subprocess.Popen(
                 [ROOT / "sls", "run", "short", "--mode", "realtime", "--rtf", "0.3", "--domain", str(domain),
-                 "--out", f"{folder}/r"], stderr=theirs)
+                 "--out", f"{self.folder}/r"], stderr=theirs)
             os.close(theirs)
             said = b""
             try:
@@ -208,14 +205,13 @@ class AnswersTest(unittest.TestCase):
         self.assertRegex(said.getvalue(), r"(?m)^  this flight +(4\.1e-04 *){5}$")
 
     def test_ctrl_c_in_a_report_is_one_line(self):
-        with tempfile.TemporaryDirectory() as folder:
-            launch("run", "short", "--in-process", "--out", "r", cwd=folder)
-            for command in ("report", "plot"):
-                process = subprocess.Popen([ROOT / "sls", command, "r"], cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-                maps = pathlib.Path(f"/proc/{process.pid}/maps")
-                deadline = time.monotonic() + 60
-                while "numpy" not in maps.read_text():  # it imports what it needs
-                    self.assertLess(time.monotonic(), deadline)
-                    time.sleep(0.001)
-                process.send_signal(signal.SIGINT)
-                self.assertEqual((*process.communicate(timeout=60), process.returncode), ("", "sls: interrupted\n", 130))
+        launch("run", "short", "--in-process", "--out", "r", cwd=self.folder)
+        for command in ("report", "plot"):
+            process = subprocess.Popen([ROOT / "sls", command, "r"], cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+            maps = pathlib.Path(f"/proc/{process.pid}/maps")
+            deadline = time.monotonic() + 60
+            while "numpy" not in maps.read_text():  # it imports what it needs
+                self.assertLess(time.monotonic(), deadline)
+                time.sleep(0.001)
+            process.send_signal(signal.SIGINT)
+            self.assertEqual((*process.communicate(timeout=60), process.returncode), ("", "sls: interrupted\n", 130))

@@ -54,7 +54,7 @@ def make_rows(count, seed=1):
 class Reader(HTMLParser):
     """Parses a page into its tags, attributes and words. `open` lists the tags that are not closed."""
 
-    VOID = {"meta", "link", "img", "br", "rect", "line", "path", "circle"}
+    VOID = {"meta", "link", "img", "br"}
 
     def __init__(self, page):
         super().__init__()
@@ -65,7 +65,7 @@ class Reader(HTMLParser):
     def handle_starttag(self, tag, attrs):
         self.tags.append(tag)
         self.attributes += attrs
-        if tag not in self.VOID or tag == "circle":
+        if tag not in self.VOID:
             self.open.append(tag)
 
     def handle_startendtag(self, tag, attrs):
@@ -73,10 +73,6 @@ class Reader(HTMLParser):
         self.attributes += attrs
 
     def handle_endtag(self, tag):
-        if self.open and self.open[-1] == "rect" != tag:
-            self.open.pop()
-        if tag in self.VOID and (not self.open or self.open[-1] != tag):
-            return
         assert self.open and self.open[-1] == tag, (tag, self.open[-3:])
         self.open.pop()
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 import sls
 from places import BUILD, ROOT, run_python
+from processes import wait_until
 
 # Noise on the measured state, and a delay of the command.
 FAULTS = [{"noise": {"on": "state", "position_m": [0.01, 0.02, 0.03], "seed": 7}},
@@ -136,14 +137,6 @@ def test_many_flights_need_no_more_memory_than_one():
     for _ in range(60):
         sls.fly(scenario).certificate
     assert (read_pages() - before) * 4096 < 2 << 20  # one flight has 0.18 MB
-
-
-def test_flights_repeat_to_the_bit_and_changes_change_them():
-    first, second = sls.fly("short"), sls.fly("short")
-    assert first.certificate == second.certificate
-    assert np.array_equal(first._cells, second._cells)
-    assert sls.fly(sls.load_scenario("short", vehicle__load_mass_kg=0.21)).certificate \
-        != first.certificate
 
 
 def test_metrics_are_those_of_the_recording(tmp_path):
@@ -307,8 +300,6 @@ def wait_for_work(pid):
         with open(f"/proc/{pid}/stat") as file:
             return int(file.read().rsplit(")", 1)[1].split()[11])
 
-    first, deadline = read_ticks(), time.monotonic() + 60
-    while read_ticks() < first + 10:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    first = read_ticks()
+    wait_until(lambda: read_ticks() >= first + 10, 60, "the flight works")
     return read_ticks()

@@ -4,6 +4,7 @@ import math
 import unittest
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sls import metrics
 from sls.trajectory import Trajectory, Stage
@@ -96,13 +97,8 @@ class StageMetricsTest(unittest.TestCase):
         nothing = np.zeros((50, 3))
         flight = Trajectory("f", np.arange(50.0), nothing, nothing, nothing, nothing[:, 0],
                         nothing[:, 0], force)
-        for f_Q_W, (roll, pitch) in zip(force, flight.calc_attitude()):
-            about_x = np.array([[1, 0, 0], [0, math.cos(roll), -math.sin(roll)],
-                                [0, math.sin(roll), math.cos(roll)]])
-            about_y = np.array([[math.cos(pitch), 0, math.sin(pitch)], [0, 1, 0],
-                                [-math.sin(pitch), 0, math.cos(pitch)]])
-            realised = -np.linalg.norm(f_Q_W) * about_y @ about_x @ [0, 0, 1]
-            np.testing.assert_allclose(realised, f_Q_W, rtol=0, atol=1e-12)
+        down = Rotation.from_euler("YX", flight.calc_attitude()[:, ::-1]).apply([0, 0, 1])
+        np.testing.assert_allclose(-np.linalg.norm(force, axis=1)[:, None] * down, force, rtol=0, atol=1e-12)
 
     def test_a_hanging_rod_points_down_and_every_rod_has_length_one(self):
         np.testing.assert_array_equal(calc_rod(np.zeros(1), np.zeros(1)), [[0, 0, 1]])

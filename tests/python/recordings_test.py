@@ -101,16 +101,6 @@ class RecordingsTest(support.FolderTest):
         for figure in make_figures([self.load()], panels={"forces": [], "path": []}).values():
             figure.savefig(io.BytesIO(), format="svg")
 
-    def test_the_attitude_that_realises_a_force_turns_the_thrust_into_it(self):
-        write_recording(self.folder / "r", last=3)
-        flight = self.load()
-        roll, pitch = flight.calc_attitude()[0]
-        q = support.quaternion_of(roll, pitch, 0)
-        up = support.multiply(q, [0, 0, 0, -1], q * [1, -1, -1, -1])[1:]
-        np.testing.assert_allclose(up * np.sqrt(1 + 4 + 256), [1, 2, -16], rtol=0, atol=1e-14)
-        np.testing.assert_allclose(calc_roll_pitch_yaw(q[np.newaxis])[0], [roll, pitch, 0],
-                                   rtol=0, atol=1e-15)
-
     def test_its_metrics_are_what_was_put_into_it(self):
         write_recording(self.folder / "r")
         stage, eight, first, second = calc_stage_metrics(self.load())

@@ -8,6 +8,7 @@ import re
 import folder_test
 import numpy as np
 from places import ROOT
+from scipy.spatial.transform import Rotation
 
 
 class FolderTest(folder_test.FolderTest):
@@ -72,15 +73,6 @@ def load_of(step, vehicle_id):
     return reference + (0.01 if step < STEPS_PER_STAGE + 200 else 0.001)
 
 
-def multiply(*quaternions):
-    """Hamilton's product of quaternions w x y z."""
-    product = np.array([1.0, 0, 0, 0])
-    for w, *v in quaternions:
-        a, u = product[0], product[1:]
-        product = np.array([a * w - u @ v, *(a * np.array(v) + w * u + np.cross(u, v))])
-    return product
-
-
 def angles_of(step):
     """Roll, pitch, yaw of the synthetic vehicle's set-point. The vehicle is 0.01 rad behind in each angle."""
     time_s = step * PERIOD_S
@@ -88,9 +80,8 @@ def angles_of(step):
 
 
 def quaternion_of(roll, pitch, yaw):
-    """Unit quaternion of rotations about z, then y, then x."""
-    return multiply(*([np.cos(angle / 2), *(np.sin(angle / 2) * np.eye(3)[axis])]
-                      for angle, axis in ((yaw, 2), (pitch, 1), (roll, 0))))
+    """Unit quaternion w x y z of rotations about z, then y, then x."""
+    return np.roll(Rotation.from_euler("ZYX", (yaw, pitch, roll)).as_quat(), 1)
 
 
 def list_body_columns(rotors):

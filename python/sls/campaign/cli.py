@@ -280,12 +280,9 @@ def main(arguments: Sequence[str]) -> int:
             COMMANDS[arguments[0]](arguments[1:])
         else:
             fly(make_parser().parse_args(join_sbatch(arguments)))
-    except (ConfigError, ImportError) as error:
+    except (ConfigError, ImportError, RunError, OSError) as error:
         say(f"error: {error}")
-        return 2
-    except (EngineError, RunError, OSError) as error:
-        say(f"error: {error}")
-        return 1
+        return 2 if isinstance(error, (ConfigError, ImportError)) else 1
     except Ended:
         return 143
     except KeyboardInterrupt:

@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 import yaml
 
 from sls.input_error import InputError
-from sls.strict_files import open_regular
+from sls.strict_files import read_limited
 
 MOST_DEPTH = 16
 WHOLE = re.compile(r"[-+]?[0-9]+")
@@ -201,13 +201,9 @@ def to_printable(text: str, most: int = 40) -> str:
 def read_bytes(file: Path, what: str, most: int) -> bytes:
     """The bytes of a file. Raises InputError if it cannot be read or has more than `most` bytes."""
     try:
-        with open_regular(file) as stream:
-            data = stream.read(most + 1)
+        return read_limited(file, most)
     except OSError as error:
         fail(file, 0, "", f"expected {what}, got no file that can be read ({error.strerror})")
-    if len(data) > most:
-        fail(file, 0, "", f"expected {what} of at most {most} bytes, got more")
-    return data
 
 
 def parse_yaml(data: bytes, file: Path) -> Place:

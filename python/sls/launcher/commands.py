@@ -124,7 +124,7 @@ def bench(words: list[str]) -> NoReturn:
         if not IS_BUILT_ELSEWHERE:
             call_script("@setup", "bench_packages")
         build_programs(*FLYING, "sls_bench_probe", "sls_microbench", "slow_clock")
-    replace_by_module("bench", "--build", BUILD, *words, paths=[str(ROOT)])
+    replace_by_module("bench", "--build", BUILD, *words, paths=[str(ROOT), *PYTHON_PATH])
 
 
 def python(words: list[str]) -> NoReturn:

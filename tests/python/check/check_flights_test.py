@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -259,13 +258,6 @@ def test_the_environment_is_not_the_controller(tmp_path, code, command, expected
     assert done.returncode == code and expected in done.stdout and "Traceback" not in done.stdout, done.stdout
     suites = ElementTree.parse(tmp_path / "junit.xml").getroot()
     assert [suites.get(key) for key in ("failures", "errors")] == ["0", str(code // 2)]
-
-
-def test_a_controller_whose_port_is_in_use_is_quoted(check):
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        port = server.getsockname()[1]
-        code, flights, _ = check(f'command: [python3, -m, http.server, -b, 127.0.0.1, "{port}"]', "--placement", "shm")
-    assert code == 1 and "Address already in use" in flights[0]["problems"][0]
 
 
 def test_a_process_that_does_not_stop_is_killed_and_named(check, impatient):

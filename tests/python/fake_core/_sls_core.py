@@ -3,8 +3,8 @@ simple functions of its values.
 
 SLS_FAKE holds words: `kill=17` ends the process in run 17 each time, `kill-once=17:FILE` only if FILE does
 not exist yet, `sleep=0.01` makes a run last 0.01 s, `hold=190:FILE` lets no run from 190 on end before FILE
-exists, `note=FOLDER` leaves the process's id there, `refuse=17` refuses run 17 when it is flown, `other=1`
-gives other measures, `print=1` prints in each run as a law or a measure may. The number of a run is the value of its last key, `index`."""
+exists, `note=FOLDER` leaves the process's id there, `refuse=17` refuses run 17 when it is flown, `print=1`
+prints in each run as a law or a measure may. The number of a run is the value of its last key, `index`."""
 
 import hashlib
 import math
@@ -55,7 +55,6 @@ class Runs:
         mass = float(values[0])
         outcome = "lost" if mass > 0.3 else "finished"
         certificate = hashlib.sha256(self.scenario_text(values).encode()).hexdigest()
-        shift = float(WORDS.get("other", 0))
         return (outcome, "load more than 1 m, further\nfrom its reference" * (outcome == "lost"),
-                [math.sqrt(mass) + shift, math.nan if outcome == "lost" else mass],
+                [math.sqrt(mass), math.nan if outcome == "lost" else mass],
                 certificate if certify else "", 8000)

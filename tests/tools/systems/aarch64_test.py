@@ -7,25 +7,26 @@ import os
 import re
 import subprocess
 import sys
-import tempfile
 import time
 import unittest
-from pathlib import Path
 from unittest import mock
 
-ROOT = Path(__file__).resolve().parents[3]
-BUILD = Path(os.environ["SLS_BUILD"])
+from folder_test import FolderTest
+from places import BUILD, ROOT
+
 sys.path.insert(0, str(ROOT / "tools/systems"))
 import aarch64  # noqa: E402
 import results  # noqa: E402
 import tree  # noqa: E402
 
+HAS_NETWORKS = os.geteuid() == 0 and subprocess.run(
+    tree.isolate("unshare", "--net", "ip", "link", "set", "lo", "up"), check=False).returncode == 0
 
-class FlightTest(unittest.TestCase):
+
+@unittest.skipUnless(HAS_NETWORKS, "needs root, namespaces and ip")
+class FlightTest(FolderTest):
     def setUp(self):
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name).resolve()
+        super().setUp()
         self.root = self.folder / "checkout"
         self.root.mkdir()
         (self.root / "build").symlink_to(BUILD)
@@ -83,11 +84,3 @@ class DocumentTest(unittest.TestCase):
         found = subprocess.run(["grep", "-cE", aarch64.FUSED], input="\n".join(lines), capture_output=True, text=True,
                                check=True).stdout
         self.assertEqual(found, "4\n")
-
-
-if __name__ == "__main__":
-    networks = tree.isolate("unshare", "--net", "ip", "link", "set", "lo", "up")
-    if os.geteuid() != 0 or subprocess.run(networks, check=False).returncode != 0:
-        print("skipped: needs root, namespaces and ip")
-        sys.exit(77)
-    unittest.main(verbosity=2)

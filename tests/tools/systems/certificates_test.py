@@ -2,16 +2,15 @@
 
 import os
 import re
-import shutil
 import subprocess
 import sys
-import tempfile
 import unittest
 import unittest.mock
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[3]
-BUILD = Path(os.environ["SLS_BUILD"])
+from folder_test import FolderTest
+from places import BUILD, ROOT
+
 sys.path.insert(0, str(ROOT / "tools/systems"))
 import certificates  # noqa: E402
 
@@ -50,38 +49,35 @@ class JudgeTest(unittest.TestCase):
         self.assertEqual((cells["arm"], defects), ("failed", ["arm: exit code 1: no"]))
 
 
-class EmulatorTest(unittest.TestCase):
+class EmulatorTest(FolderTest):
     def test_the_tree_s_emulator_comes_first_whatever_its_name(self):
-        with tempfile.TemporaryDirectory() as folder, \
-                unittest.mock.patch.dict(os.environ, {"PATH": f"{folder}/usr/bin"}):
-            (Path(folder) / "usr/bin").mkdir(parents=True)
-            tree = Path(folder) / "tree"
-            shutil.copytree(Path(folder) / "usr", tree / "usr")
+        with unittest.mock.patch.dict(os.environ, {"PATH": f"{self.folder}/usr/bin"}):
+            tree = self.folder / "tree"
+            for folder in self.folder, tree:
+                (folder / "usr/bin").mkdir(parents=True)
             self.assertIsNone(certificates.find_emulator("aarch64", tree))
-            for program in Path(folder) / "usr/bin/qemu-aarch64-static", tree / "usr/bin/qemu-aarch64":
+            for program in self.folder / "usr/bin/qemu-aarch64-static", tree / "usr/bin/qemu-aarch64":
                 program.touch(mode=0o755)
                 self.assertEqual(certificates.find_emulator("aarch64", tree), str(program))
 
 
-class FlightTest(unittest.TestCase):
+class FlightTest(FolderTest):
     def test_the_analytic_variant_flies_the_same_way_within_a_nanometre(self):
-        with tempfile.TemporaryDirectory() as folder:
-            scenarios = certificates.list_scenarios(["short", "multirotor_geometric"], Path(folder))
-            self.assertEqual({name: plant for name, (_, plant) in scenarios.items()},
-                             {"multirotor_geometric": "multirotor", "short": "slung_load",
-                              "short-analytic": "analytic"})
-            flown, variant = (certificates.fly(HERE, scenarios[name][0], True) for name in ("short", "short-analytic"))
-            self.assertEqual((flown.error, variant.error), ("", ""))
-            self.assertGreater(len(flown.load), 100)
-            self.assertLess(certificates.calc_difference(variant, flown), 1e-9)
+        scenarios = certificates.list_scenarios(["short", "multirotor_geometric"], self.folder)
+        self.assertEqual({name: plant for name, (_, plant) in scenarios.items()},
+                         {"multirotor_geometric": "multirotor", "short": "slung_load",
+                          "short-analytic": "analytic"})
+        flown, variant = (certificates.fly(HERE, scenarios[name][0], True) for name in ("short", "short-analytic"))
+        self.assertEqual((flown.error, variant.error), ("", ""))
+        self.assertGreater(len(flown.load), 100)
+        self.assertLess(certificates.calc_difference(variant, flown), 1e-9)
 
     def test_every_variant_is_a_scenario(self):
-        with tempfile.TemporaryDirectory() as folder:
-            for name, (file, plant) in certificates.list_scenarios([], Path(folder)).items():
-                checked = subprocess.run([BUILD / "bin/sim_server", "--check", "--scenario", file], timeout=60,
-                                         capture_output=True, text=True, check=False)
-                self.assertIn(plant, ("analytic", "cables", "multirotor", "slung_load"))
-                self.assertEqual(checked.returncode, 0, f"{name}: {checked.stderr}")
+        for name, (file, plant) in certificates.list_scenarios([], self.folder).items():
+            checked = subprocess.run([BUILD / "bin/sim_server", "--check", "--scenario", file], timeout=60,
+                                     capture_output=True, text=True, check=False)
+            self.assertIn(plant, ("analytic", "cables", "multirotor", "slung_load"))
+            self.assertEqual(checked.returncode, 0, f"{name}: {checked.stderr}")
 
     def test_a_program_that_fails_gives_its_last_line(self):
         flight = certificates.fly(HERE, Path("/none.yaml"), False)

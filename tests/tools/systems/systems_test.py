@@ -13,9 +13,14 @@ import time
 import unittest
 import unittest.mock
 
-ROOT = pathlib.Path(__file__).resolve().parents[3]
+from places import ROOT
+from processes import wait_until
+
 sys.path.insert(0, str(ROOT / "tools/systems"))
 import tree  # noqa: E402
+
+HAS_NAMESPACES = os.geteuid() == 0 and subprocess.run(
+    ["unshare", "--mount", "--pid", "--fork", "--mount-proc", "true"], check=False).returncode == 0
 LIMIT_S = 200  # for what takes seconds on an idle machine
 PROGRAMS = ("bash", "cat", "chroot", "env", "ls", "mkdir", "mount", "sh", "sleep", "touch", "true", "sed", "unshare")
 DEBOOTSTRAP = """#!/bin/sh
@@ -46,11 +51,6 @@ esac
 SLOW = "#!/bin/bash\ntouch started\nsleep 1000 &\nsleep 1000\n"
 
 
-def skip(reason):
-    print(f"skipped: {reason}")
-    sys.exit(77)
-
-
 def make_base(folder):
     """Fills the folder with PROGRAMS and the libraries that they need."""
     for name in ("dev", "etc/apt/apt.conf.d", "etc/dpkg/dpkg.cfg.d", "proc", "root", "run", "sys", "tmp", "usr/bin"):
@@ -65,6 +65,7 @@ def make_base(folder):
         shutil.copy(library, folder / library[1:])
 
 
+@unittest.skipUnless(HAS_NAMESPACES, "needs root and namespaces")
 class SystemsTest(unittest.TestCase):
     maxDiff = None
 
@@ -222,19 +223,13 @@ class SystemsTest(unittest.TestCase):
         self.wait_for_start()
         process.kill()
         process.communicate(timeout=LIMIT_S)
-        deadline = time.monotonic() + LIMIT_S
-        while self.find_processes() and time.monotonic() < deadline:
-            time.sleep(0.01)
-        self.assertEqual(self.find_processes(), [])
+        wait_until(lambda: not self.find_processes(), LIMIT_S, "no process is left")
         self.write_launcher(DEMO)
         self.assertEqual(self.run_systems("debian12", "--commands", "demo")[0], 0)
         self.expect_nothing_left()
 
     def wait_for_start(self):
-        deadline = time.monotonic() + LIMIT_S
-        while not (self.trees / "debian12/sls/started").exists():
-            self.assertLess(time.monotonic(), deadline)
-            time.sleep(0.01)
+        wait_until((self.trees / "debian12/sls/started").exists, LIMIT_S, "the demo starts")
 
     def find_processes(self):
         """Processes whose root is in a tree of this test."""
@@ -338,14 +333,3 @@ class SystemsTest(unittest.TestCase):
                                                          "this folder\n"))
         process.send_signal(signal.SIGINT)
         process.communicate(timeout=LIMIT_S)
-
-
-if __name__ == "__main__":
-    if os.geteuid() != 0:
-        skip("only root can make a system")
-    for tool in PROGRAMS + ("git", "setpriv"):
-        if not shutil.which(tool):
-            skip(f"{tool} is missing")
-    if subprocess.run(["unshare", "--mount", "--pid", "--fork", "--mount-proc", "true"], check=False).returncode != 0:
-        skip("this machine gives no namespaces, or no /proc in them")
-    unittest.main(argv=sys.argv[:1])

@@ -14,7 +14,7 @@ from sls.campaign.engines.cluster import describe_rest, find_missing, find_place
 from sls.campaign.folder import CampaignFolder
 from sls.campaign.progress import Progress
 from sls.input_error import InputError
-from sls.launcher.place import escape_controls
+from sls.launcher.place import say
 
 CHUNK_S = 5.0            # work in a chunk, s
 MOST_TRIES = 3           # tries of a chunk after errors that may be temporary
@@ -22,10 +22,6 @@ CONNECT_S = 10.0
 WITHOUT_WORKERS_S = 60.0
 EVERY_S = 0.5
 START = "start one with `dask-scheduler`, and on each machine `dask-worker ADDRESS --nthreads 1`"
-
-
-def say(text: str) -> None:
-    print(f"sls: dask: {escape_controls(text)}", file=sys.stderr, flush=True)
 
 
 def make_task() -> Any:
@@ -166,7 +162,7 @@ def watch_workers(client: Any, without_since: float | None) -> float | None:
         return None
     now = time.monotonic()
     if without_since is None:
-        say("waiting for workers: dask-worker ADDRESS --nthreads 1")
+        say("dask: waiting for workers: dask-worker ADDRESS --nthreads 1")
         return now
     if now - without_since > WITHOUT_WORKERS_S:
         raise EngineError(f"dask: no worker for {WITHOUT_WORKERS_S:.0f} s; what is flown stays, "

@@ -21,7 +21,7 @@ from sls.campaign.folder import COLLECT_JOB, CampaignFolder, DamagedChunk
 from sls.campaign.progress import Progress
 from sls.campaign.whole_files import write_whole
 from sls.input_error import InputError
-from sls.launcher.place import escape_controls
+from sls.launcher.place import say
 
 CHUNK_S = 60.0         # work in a chunk, s
 TASK_S = 60.0          # least work in a task, s, because Slurm starts only a few tasks per second
@@ -58,10 +58,6 @@ def ask(*command: str) -> str:
 
 def to_one_line(text: str) -> str:
     return "; ".join(line.strip() for line in text.splitlines() if line.strip())
-
-
-def say(text: str) -> None:
-    print(f"sls: slurm: {escape_controls(text)}", file=sys.stderr, flush=True)
 
 
 def name_job(folder: CampaignFolder) -> str:
@@ -244,7 +240,7 @@ def submit_round(folder: CampaignFolder, missing: Sequence[int], number: int,
     write_whole(script, make_collect_script(place, number, options).encode())
     submit(script, name_collect_job(folder), own / "collect-%j.log", options.sbatch,
            "--requeue", "--dependency=afterany:" + ":".join(done.jobs))
-    say(f"job {', '.join(done.jobs)}: chunks: {len(missing)}, tasks: {len(tasks)}"
+    say(f"slurm: job {', '.join(done.jobs)}: chunks: {len(missing)}, tasks: {len(tasks)}"
         + (f", submission {number} of {MOST_ROUNDS}" if number > 1 else ""))
     return done
 
@@ -343,9 +339,9 @@ def run(folder: CampaignFolder, options: EngineOptions) -> None:
             try:
                 cancel(folder)
             except (EngineError, ControllerLost) as error:
-                say(f"could not cancel job {name_job(folder)}: {error}")
+                say(f"slurm: could not cancel job {name_job(folder)}: {error}")
         else:
-            say(f"the jobs go on, and job {name_collect_job(folder)} makes runs.csv")
+            say(f"slurm: the jobs go on, and job {name_collect_job(folder)} makes runs.csv")
         raise
     if missing:
         raise EngineError(describe_missing(folder, missing, submitted))
@@ -367,14 +363,14 @@ def collect(folder: CampaignFolder, number: int, options: EngineOptions) -> None
     try:
         folder.take_lock(COLLECT_JOB)
     except InputError as error:
-        say(f"nothing to do: {error}")
+        say(f"slurm: nothing to do: {error}")
         return
     missing = find_missing(folder, is_last_try=number >= MOST_ROUNDS)
     if not missing:
         collect_folder(folder, "slurm")
-        say(f"{folder.folder}/runs.csv")
+        say(f"slurm: {folder.folder}/runs.csv")
         if broken := describe_broken_measures(folder.manifest):
-            say(f"error: {broken}")
+            say(f"slurm: error: {broken}")
     elif number < MOST_ROUNDS:
         submit_round(folder, missing, number + 1, options)
     else:
@@ -390,7 +386,7 @@ def main(arguments: Sequence[str]) -> int:
             workers=int(workers) or None, sbatch=sbatch, chunk_runs=int(chunk_runs) or None))
         return 0
     except (InputError, EngineError, ControllerLost, OSError) as error:
-        say(f"error: {error}")
+        say(f"slurm: error: {error}")
         return 1
     finally:
         folder.close()

@@ -51,6 +51,12 @@ const drag = (page, time) => page.$eval("#time", (slider, value) => {
   slider.dispatchEvent(new Event("input"));
 }, String(time));
 
+/** Where a camera without perspective shows what is so many metres to the right of its target and above it. */
+function toPixel({ area, height_m }, right, up) {
+  const scale = area.height / height_m;
+  return [area.left + area.width / 2 + right * scale, area.top + area.height / 2 - up * scale];
+}
+
 before(async () => {
   chromium = await startBrowser({ flags: kLean });
   browser = chromium.browser;
@@ -77,14 +83,10 @@ test("the slider shows the positions of the CSV file, and the load's colour is w
       assert.ok(Math.abs(pose.quad[axis] - row[`quad_${name}_m`]) < 1e-6, `quad ${name} at step ${step}`);
       assert.ok(Math.abs(pose.load[axis] - row[`load_${name}_m`]) < 1e-6, `load ${name} at step ${step}`);
     }
-    // From above: x up, y to the right; the height of the picture is `height_m` metres.
+    // From above: x up, y to the right.
     const { camera, projection } = await page.evaluate(() => ({
       camera: window.slsView.camera(), projection: window.slsView.projection(0) }));
-    const scale = camera.area.height / camera.height_m;
-    const expected = [
-      camera.area.left + camera.area.width / 2 + (row.load_y_m - camera.target_m[1]) * scale,
-      camera.area.top + camera.area.height / 2 - (row.load_x_m - camera.target_m[0]) * scale,
-    ];
+    const expected = toPixel(camera, row.load_y_m - camera.target_m[1], row.load_x_m - camera.target_m[0]);
     assert.ok(Math.hypot(projection.load[0] - expected[0], projection.load[1] - expected[1]) < 1.5, `step ${step}`);
   }
   await page.click("[data-camera=follow]");
@@ -118,9 +120,7 @@ test("one load is drawn at its centre, and its cables are taut, hang slack or ar
   let [camera, points] = await show(drop.page, "side", row.sim_time_s);
   const fold = row.load_z_m + (1 - (row.load_z_m - row.quad_z_m)) / 2;
   assert.ok(Math.abs(Math.max(...points.map(([, , z]) => z)) - fold) < 2e-3, `${fold}: ${points}`);
-  const scale = camera.area.height / camera.height_m;
-  const [x, y] = [camera.area.left + camera.area.width / 2 + (row.load_x_m - camera.target_m[0]) * scale,
-    camera.area.top + camera.area.height / 2 + (fold - 0.1 - camera.target_m[2]) * scale];
+  const [x, y] = toPixel(camera, row.load_x_m - camera.target_m[0], camera.target_m[2] - fold + 0.1);
   const colours = await readPixels(browser, await drop.page.screenshot(), [-1, 0, 1].map((off) => [x + off, y]));
   assert.ok(colours.some((colour) => isNear(colour, [153, 161, 171], 8)), `a slack cable, got ${colours.join("  ")}`);
   [, points] = await show(drop.page, "side", 0.9);
@@ -140,9 +140,7 @@ test("one load is drawn at its centre, and its cables are taut, hang slack or ar
   const dot = (line) => line.reduce((sum, value, index) => sum + value * corner[index], 0);
   const centre = [row.load_x_m - dot([1 - 2 * (b * b + c * c), 2 * (a * b - w * c), 2 * (a * c + w * b)]),
     row.load_y_m - dot([2 * (a * b + w * c), 1 - 2 * (a * a + c * c), 2 * (b * c - w * a)])];
-  const metre = camera.area.height / camera.height_m;
-  const pixel = [camera.area.left + camera.area.width / 2 + (centre[1] - camera.target_m[1]) * metre,
-    camera.area.top + camera.area.height / 2 - (centre[0] - camera.target_m[0]) * metre];
+  const pixel = toPixel(camera, centre[1] - camera.target_m[1], centre[0] - camera.target_m[0]);
   // Below a rotor, whose disc is faint; a blade may cross some of these places.
   const places = [-3, 0, 3].map((off) => pixel.map((at) => at + off));
   const seen = await readPixels(browser, await cut.page.screenshot(), places);

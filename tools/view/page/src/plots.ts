@@ -68,7 +68,7 @@ export class Plots {
 
   /** Sets all rows of a recording at once. */
   replace(rows: Rows, index: RunIndex = 0): void {
-    this.samples[index].clear();
+    this.samples[index].count = 0;
     this.samples[index].append(rows);
     if (index === 1) this.rebuild(); // now the lines of the second recording are drawn, too
     this.touch();
@@ -138,7 +138,7 @@ export class Plots {
   private calcWindow(): [number, number] {
     const filled = this.samples.filter(({ count }) => count > 0);
     const first = Math.min(...filled.map(({ time }) => time[0]!));
-    const last = Math.max(...filled.map((samples) => samples.last));
+    const last = Math.max(...filled.map(({ time, count }) => time[count - 1]!));
     if (filled.length === 0) return [0, this.window ?? 30];
     if (this.window === null) return [first, Math.max(last, first + 1)];
     if (this.cursor === null) return last - first < this.window ? [first, first + this.window] : [last - this.window, last];

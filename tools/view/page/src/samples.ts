@@ -29,14 +29,6 @@ export class Samples {
     }
   }
 
-  clear(): void {
-    this.count = 0;
-  }
-
-  get last(): number {
-    return this.count > 0 ? this.time[this.count - 1]! : NaN;
-  }
-
   /** Index of the first sample at or after `time`. */
   find(time: number): number {
     return findFirst(this.time, this.count, time);

@@ -1,6 +1,7 @@
 /** The parts of the page that a live flight and a recording share: scene, plots, table, cameras, keys, theme. */
 import { find, isTyping, make, makeChoice, setText } from "./dom";
 import { Plots } from "./plots";
+import { distance } from "./replay/recording";
 import { Scene } from "./scene";
 import type { CameraMode, Pose, Run, RunIndex } from "./types";
 
@@ -229,7 +230,7 @@ class Table {
     for (const pose of poses) {
       const cells = this.rows.get(pose.vehicleId)?.cells;
       if (!cells) continue;
-      const numbers = [...Array.from(pose.quad).slice(0, 3), ...Array.from(pose.load).slice(0, 3), calcError(pose)];
+      const numbers = [...Array.from(pose.quad).slice(0, 3), ...Array.from(pose.load).slice(0, 3), distance(pose.load, pose.reference)];
       numbers.forEach((value, index) => setText(cells[index + 1]!, format(value)));
     }
   }
@@ -239,7 +240,7 @@ class Table {
     if (!pose) return;
     const place = (point: ArrayLike<number>) => `x ${format(point[0]!)}, y ${format(point[1]!)}, height ${format(-point[2]!)} m`;
     const text = `At ${simTime.toFixed(1)} s vehicle ${pose.vehicleId}: quadrotor ${place(pose.quad)}; load ${place(pose.load)}; ` +
-      `load off its reference by ${format(calcError(pose))} m.`;
+      `load off its reference by ${format(distance(pose.load, pose.reference))} m.`;
     setText(find("scene-text"), text);
   }
 
@@ -247,10 +248,6 @@ class Table {
     this.root.hidden = !isShown;
     this.toggle.setAttribute("aria-pressed", String(isShown));
   }
-}
-
-function calcError({ load, reference }: Pose): number {
-  return Math.hypot(load[0]! - reference[0]!, load[1]! - reference[1]!, load[2]! - reference[2]!);
 }
 
 function format(value: number): string {

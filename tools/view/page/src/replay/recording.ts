@@ -1,13 +1,7 @@
 /** A recording as sls_view packs it (tools/view/replay/README.md): checks its bytes, gives poses at any time. */
 import { Quaternion } from "three";
 import { findFirst } from "../samples";
-import { Columns, type Cable, type Pose, type Rows, type Run } from "../types";
-
-export interface RecordedEvent {
-  step: number;
-  sim_time_s: number;
-  text: string;
-}
+import { Columns, type Cable, type FlightEvent, type Pose, type Rows, type Run } from "../types";
 
 export interface RecordedFault {
   from_s: number;
@@ -31,7 +25,7 @@ export interface Head {
   outcome: string;
   every: number;
   steps_total: number;
-  events: RecordedEvent[];
+  events: Omit<FlightEvent, "run_id">[];
   faults: RecordedFault[];
   stage_starts: RecordedStage[];
   vehicles: { id: number; rows: number }[];
@@ -93,17 +87,12 @@ export function parseRecording(bytes: ArrayBuffer): Recording {
     // Copied, because the times of a second vehicle may begin at any multiple of 4 bytes.
     const time = new Float64Array(bytes.slice(at, at + 8 * count));
     const values = new Float32Array(bytes.slice(at + 8 * count, at + size));
-    expect(isAscending(time), `ascending times of vehicle ${id}`);
+    expect(time.every((at, row) => at > (row ? time[row - 1]! : -1)), `ascending times of vehicle ${id}`);
     rows.set(id, { vehicleId: id, time, values, columns });
     at += size;
   }
   expect(at === bytes.byteLength, `${at} bytes, got ${bytes.byteLength}`);
   return new Recording(head, rows);
-}
-
-function isAscending(time: Float64Array): boolean {
-  for (let i = 0; i < time.length; ++i) if (!(time[i]! > (i ? time[i - 1]! : -1))) return false;
-  return true;
 }
 
 export class Recording {
