@@ -57,6 +57,7 @@ Development
   bench                   measure speed, each figure beside its bound
   chaos                   stop, kill and restart processes of flights at random
   fuzz                    feed mutated input to readers of files and samples
+  mutants                 make defects in the cores, and see which are found
   reference               write docs/reference
   package                 build a Debian package: build/package/
   systems [NAME…]         run the two commands in clean Debian systems
@@ -71,8 +72,8 @@ exit codes: 0 done; 1 the run or a test failed; 2 bad usage or configuration;
 """
 # Commands whose options a program or another Python module reads.
 FOREIGN = ("view", "ctl", "verify", "convert", "plot", "report", "study", "campaign", "campaign-worker", "doctor",
-           "bench", "worlds", "check", "network-table", "chaos", "reference", "systems")
-SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "fuzz", "network-table",
+           "bench", "worlds", "check", "network-table", "chaos", "mutants", "reference", "systems")
+SOURCE_COMMANDS = ("bench", "build", "chaos", "clean", "docker-demo", "fuzz", "mutants", "network-table",
                    "package", "reference", "setup", "study", "systems", "test")
 
 
@@ -256,6 +257,12 @@ def reference(words: list[str]) -> NoReturn:
     replace_by(PYTHON, "-B", ROOT / "tools/reference", "--build", BUILD, *words)
 
 
+def mutants(words: list[str]) -> NoReturn:
+    if not is_help_asked(words):
+        call_script("@setup", "test_packages", "mutants_packages")
+    replace_by(PYTHON, "-B", ROOT / "tests/worlds/mutants.py", *words)
+
+
 def systems(words: list[str]) -> NoReturn:
     if "aarch64" in words and not is_help_asked(words):
         call_script("@install", "python_packages")
@@ -303,7 +310,7 @@ COMMANDS: dict[str, Callable[[list[str]], int]] = {
     "verify": start("sls_verify"), "convert": start("sls_convert"), "python": python, "plot": plot, "report": report,
     "study": study, "check": check, "campaign": campaign, "campaign-worker": campaign_worker, "doctor": start("sls_doctor"),
     "keys": keys, "docker-demo": docker_demo, "discovery-server": discovery_server, "network-table": network_table,
-    "fuzz": fuzz, "chaos": start("chaos", "tests"), "test": test, "reference": reference,
+    "fuzz": fuzz, "chaos": start("chaos", "tests"), "mutants": mutants, "test": test, "reference": reference,
     "systems": systems, "package": package, "clean": clean, "help": show_help,
 }
 
