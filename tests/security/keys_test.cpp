@@ -4,9 +4,6 @@
 
 #include <algorithm>
 
-#include "tests/security/secured_run.hpp"
-#include "tests/support/waiting.hpp"
-
 namespace sls::test {
 namespace {
 
