@@ -4,6 +4,9 @@
 
 #include <algorithm>
 
+#include "tests/security/keys.hpp"
+#include "tests/system/flight.hpp"
+
 namespace sls::test {
 namespace {
 
