@@ -2,8 +2,6 @@
 // library.
 #include <benchmark/benchmark.h>
 
-#include <memory>
-
 #include "control_client/laws/control_law.hpp"
 
 namespace sls::bench {

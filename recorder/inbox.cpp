@@ -1,6 +1,5 @@
 #include "recorder/inbox.hpp"
 
-#include <chrono>
 #include <utility>
 #include <vector>
 

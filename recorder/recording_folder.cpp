@@ -7,10 +7,8 @@
 #include <array>
 #include <cerrno>
 #include <fstream>
-#include <string>
 #include <string_view>
 #include <system_error>
-#include <vector>
 
 #include "common/config/config_error.hpp"
 

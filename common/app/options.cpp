@@ -1,7 +1,6 @@
 #include "common/app/options.hpp"
 
 #include <cstdlib>
-#include <string>
 
 #include "common/config/domain.hpp"
 

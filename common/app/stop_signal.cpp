@@ -6,7 +6,6 @@
 #include <atomic>
 #include <csignal>
 #include <cstring>
-#include <initializer_list>
 
 namespace sls::app {
 namespace {

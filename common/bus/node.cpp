@@ -19,23 +19,20 @@
 #include <algorithm>
 #include <atomic>
 #include <charconv>
-#include <chrono>
 #include <cstddef>
 #include <cstdlib>
 #include <limits>
-#include <map>
 #include <mutex>
 #include <string_view>
 #include <system_error>
-#include <utility>
 
 #include "common/bus/environment.hpp"
 #include "common/bus/fastdds/data_sharing.hpp"
 #include "common/bus/fastdds/discovered_participants.hpp"
 #include "common/bus/fastdds/facts_of.hpp"
 #include "common/bus/fastdds/guarded_transports.hpp"
-#include "common/bus/fastdds/host_id.hpp"
 #include "common/bus/fastdds/guarded_type.hpp"
+#include "common/bus/fastdds/host_id.hpp"
 #include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/neighbours.hpp"
 #include "common/bus/fastdds/participant_ids.hpp"

@@ -12,7 +12,6 @@
 #include <map>
 #include <memory>
 #include <sstream>
-#include <string>
 #include <string_view>
 #include <system_error>
 #include <vector>

@@ -1,6 +1,5 @@
 #include "common/config/scenario.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <fstream>

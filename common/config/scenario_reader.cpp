@@ -1,10 +1,8 @@
 #include "common/config/scenario_reader.hpp"
 
-#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "common/config/numbers.hpp"
 #include "common/text/edit_distance.hpp"

@@ -1,6 +1,5 @@
 #include "common/scene/load_scene.hpp"
 
-#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 

@@ -6,10 +6,10 @@
 
 #include <cmath>
 #include <complex>
-#include <optional>
 
 #include "closed_loop/flight.hpp"
 #include "tests/closed_loop/support.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::closed_loop::test {
 namespace {
@@ -165,13 +165,9 @@ TEST(DelayMarginTest, VehiclesThatDifferInTheirOwnDelayHaveNoCommonOne) {
 }
 
 TEST(DelayMarginTest, AVehicleThatIsNotThereIsRefused) {
-  try {
-    find_delay_margin(load_short_team(), 3);
-    FAIL() << "no error";
-  } catch (const config::ConfigError& error) {
-    EXPECT_STREQ(error.what(),
-                 "--vehicle: expected one of three_carry_a_triangle_pose, 0 to 2, got 3");
-  }
+  EXPECT_EQ(
+      sls::test::find_error<config::ConfigError>([] { find_delay_margin(load_short_team(), 3); }),
+      "--vehicle: expected one of three_carry_a_triangle_pose, 0 to 2, got 3");
 }
 
 TEST(DelayMarginTest, TheScenariosOwnDelayIsPartOfIt) {
@@ -253,15 +249,9 @@ TEST(DelayMarginTest, ReportsALoadThatIsNeverLost) {
 TEST(DelayMarginTest, AScenarioThatLosesTheLoadAnywayIsAnError) {
   config::Scenario scenario = load("matlab_setpoint_3");
   scenario.controller.force_limit_n = 100.0;
-  try {
-    find_delay_margin(scenario);
-    FAIL() << "no error";
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(
-        error.what(),
-        "the load is lost without any added delay: controller 'control_client' answered step "
-        "0 with a force beyond controller.force_limit_n: 116.04 N > 100 N, at 0 s");
-  }
+  EXPECT_EQ(sls::test::find_error<std::runtime_error>([&] { find_delay_margin(scenario); }),
+            "the load is lost without any added delay: controller 'control_client' answered step 0 "
+            "with a force beyond controller.force_limit_n: 116.04 N > 100 N, at 0 s");
 }
 
 }  // namespace

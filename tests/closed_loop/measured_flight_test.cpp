@@ -15,6 +15,7 @@
 #include "common/text/sha256.hpp"
 #include "recorder/manifest.hpp"
 #include "tests/closed_loop/support.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::closed_loop::test {
@@ -222,15 +223,11 @@ TEST(FlightMeasuresTest, ListsColumnsInTheOrderOfTheMeasures) {
 }
 
 TEST(FlightMeasuresTest, AnUnknownMeasureIsRefusedWithTheListOfThose) {
-  try {
-    MeasureList(load("short"), {"load_error_mean"});
-    FAIL() << "no error";
-  } catch (const config::ConfigError& error) {
-    EXPECT_STREQ(error.what(),
-                 "measure: expected load_error_rms, load_error_max, settling, overshoot, tilt_max, "
-                 "force_max, time_of_loss, load_error_end, quad_error_rms, quad_error_max, "
-                 "quad_error_end, attitude_max, energy_max or outcome, got 'load_error_mean'");
-  }
+  EXPECT_EQ(sls::test::find_error<config::ConfigError>(
+                [] { MeasureList(load("short"), {"load_error_mean"}); }),
+            "measure: expected load_error_rms, load_error_max, settling, overshoot, tilt_max, "
+            "force_max, time_of_loss, load_error_end, quad_error_rms, quad_error_max, "
+            "quad_error_end, attitude_max, energy_max or outcome, got 'load_error_mean'");
 }
 
 // --- outcome -------------------------------------------------------------------------------------
@@ -303,12 +300,9 @@ TEST(MeasuredFlightTest, OfSeveralVehiclesEachMeasureIsTheLargest) {
 }
 
 TEST(MeasuredFlightTest, AnotherNumberOfVehiclesThanInTheBaseIsRefused) {
-  try {
-    fly_all(load("mixed_fleet"), load("short"));
-    FAIL() << "no error";
-  } catch (const config::ConfigError& error) {
-    EXPECT_STREQ(error.what(), "vehicles: expected 1, as in the base scenario, got 4");
-  }
+  EXPECT_EQ(sls::test::find_error<config::ConfigError>(
+                [] { fly_all(load("mixed_fleet"), load("short")); }),
+            "vehicles: expected 1, as in the base scenario, got 4");
 }
 
 TEST(MeasuredFlightTest, PollsDuringTheFlightAndStopsWhenThePollThrows) {
@@ -424,14 +418,10 @@ TEST(CampaignRunsTest, AnotherPeriodIsInEachRunsText) {
 template <class Work>
 std::string find_error(const std::filesystem::path& file, const std::string& path,
                        const Work& work) {
-  try {
-    work(CampaignRuns(file, {path}, {"outcome"}));
-  } catch (const config::ConfigError& error) {
-    std::string text = error.what();
-    const std::string place = file.string();
-    return text.rfind(place, 0) == 0 ? "FILE" + text.substr(place.size()) : text;
-  }
-  return "";
+  const std::string place = file.string(), text = sls::test::find_error<config::ConfigError>([&] {
+                                             work(CampaignRuns(file, {path}, {"outcome"}));
+                                           });
+  return text.rfind(place, 0) == 0 ? "FILE" + text.substr(place.size()) : text;
 }
 
 TEST(CampaignRunsTest, MistakesNameFileAndKey) {
@@ -439,14 +429,14 @@ TEST(CampaignRunsTest, MistakesNameFileAndKey) {
     return [value](const CampaignRuns& runs) { runs.check({value}); };
   };
   const auto file = file_of("short");
-  EXPECT_EQ(find_error(file, "vehicle.load_mass_kg", check("0.3")), "");
+  EXPECT_EQ(find_error(file, "vehicle.load_mass_kg", check("0.3")), "no error");
   EXPECT_EQ(find_error(file, "vehicle.load_mass_kg", check("-0.3")),
             "FILE:3: vehicle.load_mass_kg: expected > 0, got -0.3");
   EXPECT_EQ(find_error(file, "vehicle.load_mas_kg", check("0.3")).substr(0, 25),
             "FILE:3: vehicle.load_mas_");
   EXPECT_EQ(find_error(file, "vehicles", check("2")),
             "FILE: vehicles: expected 1, as in the base scenario, got 2");
-  EXPECT_EQ(find_error(file_of("mixed_fleet"), "vehicle.load_mass_kg", check("0.3")), "");
+  EXPECT_EQ(find_error(file_of("mixed_fleet"), "vehicle.load_mass_kg", check("0.3")), "no error");
   EXPECT_EQ(find_error(file, "vehicle.load_mass_kg",
                        [](const CampaignRuns& runs) {
                          runs.check({"1", "2"});

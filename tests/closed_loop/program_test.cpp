@@ -121,33 +121,5 @@ TEST(ClosedLoopErrorsTest, AFullDiskLeavesNoFolder) {
   EXPECT_FALSE(std::filesystem::exists(folder / "recording"));
 }
 
-TEST(ClosedLoopErrorsTest, AModelThatDoesNotExistIsRefusedWithTheListOfThose) {
-  TemporaryFolder folder;
-  const std::string file =
-      make_scenario(folder, {{"pendulum: ideal", "model: slungload"}}, "figure_eight");
-  Process alone(fly_in_process(file, folder / "recording"));
-  EXPECT_EQ(alone.wait(), 2) << alone.output();
-  EXPECT_TRUE(holds(
-      alone.output(),
-      "plant.model: expected analytic, cables, multirotor, slung_load or a shared library (a path "
-      "ending in .so), got slungload; did you mean 'slung_load'?"))
-      << alone.output();
-  EXPECT_FALSE(std::filesystem::exists(folder / "recording"));
-}
-
-TEST(ClosedLoopErrorsTest, AKeyOfAnotherPlantIsRefusedWithItsOwner) {
-  TemporaryFolder folder;
-  const std::string file = make_scenario(
-      folder, {{"pendulum: ideal", "model: analytic\n  pendulum: ideal"}}, "figure_eight");
-  for (const char* name : {"closed_loop", "sim_server", "control_client"}) {
-    Process process({program(name), "--scenario", file});
-    EXPECT_EQ(process.wait(), 2) << process.output();
-    EXPECT_TRUE(holds(process.output(),
-                      "plant.pendulum: a key of model 'multirotor' or model 'slung_load', here "
-                      "model is 'analytic'"))
-        << process.output();
-  }
-}
-
 }  // namespace
 }  // namespace sls::test

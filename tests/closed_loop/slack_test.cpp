@@ -1,7 +1,6 @@
 // The law `qsf` on cables that go slack: drops, a kick and a cut, each also without the rule.
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
 #include <cmath>
 #include <cstdlib>
 #include <random>

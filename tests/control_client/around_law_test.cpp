@@ -6,7 +6,6 @@
 #include <cmath>
 #include <random>
 
-#include "common/model/forces.hpp"
 #include "tests/support/random_vectors.hpp"
 
 namespace sls::control {
@@ -39,15 +38,6 @@ TEST(StateWiringTest, GazeboWiringFollowsTheLiteralFormula) {
   }
 }
 
-TEST(StateWiringTest, GazeboWiringIsHarmlessOnlyWhileTheRodHangsStill) {
-  const model::RodAngles slots =
-      calc_wired_angles({0.0, 0.0, 0.0, 0.0}, config::StateWiring::kGazeboPlugin, 1.1);
-  EXPECT_EQ(slots.alpha, 0.0);
-  EXPECT_EQ(slots.beta, 0.0);
-  EXPECT_EQ(slots.alpha_dot, 0.0);
-  EXPECT_EQ(slots.beta_dot, 0.0);
-}
-
 TEST(DragFeedForwardTest, ForceAndItsDragAddUpToTheLawsForce) {
   std::mt19937 generator(1);
   int judged = 0;
@@ -64,18 +54,6 @@ TEST(DragFeedForwardTest, ForceAndItsDragAddUpToTheLawsForce) {
     ASSERT_LE((force + model::calc_rotor_drag(force, v, air) - wanted).norm(),
               1.01e-12 * wanted.norm());
   }
-}
-
-TEST(DragFeedForwardTest, AgreesWithTheClosedFormInThePlane) {
-  // Wanted force −N e₃, velocity u e₁: F = |F| (sin θ, 0, −cos θ). Normal to F: the drag is
-  // D u cos θ = N sin θ, and tan θ = D u / N. Along F: |F| = N cos θ.
-  const double N = 17.0, D = 0.4, u = 3.0;
-  const double theta = std::atan2(D * u, N);
-  const Eigen::Vector3d force =
-      calc_drag_feed_forward({0.0, 0.0, -N}, {u, 0.0, 0.0}, {D, {0.0, 0.0, 0.0}});
-  const Eigen::Vector3d expected =
-      N * std::cos(theta) * Eigen::Vector3d(std::sin(theta), 0.0, -std::cos(theta));
-  EXPECT_LE((force - expected).norm(), 1e-11);
 }
 
 TEST(DragFeedForwardTest, WithoutDragNothingChanges) {

@@ -1,8 +1,6 @@
 // Results of runs with controller and mission on the oracle ODE, without Simbody and DDS.
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "control_client/laws/qsf/lqr.hpp"
 #include "tests/control_client/oracle_flight.hpp"
 #include "tests/control_client/sample_scenarios.hpp"

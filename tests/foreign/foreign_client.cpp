@@ -13,7 +13,6 @@
 #include <fastdds/dds/subscriber/Subscriber.hpp>
 #include <fastdds/dds/topic/Topic.hpp>
 
-#include <algorithm>
 #include <array>
 #include <chrono>
 #include <csignal>

@@ -2,7 +2,6 @@
 /// the mistake prints one line about it, and `sim_ctl status` shows it.
 #include <gtest/gtest.h>
 
-#include <csignal>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <regex>

@@ -6,7 +6,6 @@
 #include <string>
 
 #include "common/config/config_error.hpp"
-#include "recorder/recording_folder.hpp"
 #include "recorder/verification.hpp"
 #include "tests/support/temporary_folder.hpp"
 

@@ -1,7 +1,6 @@
 #include <atomic>
 #include <chrono>
 #include <limits>
-#include <memory>
 #include <mutex>
 #include <optional>
 #include <random>

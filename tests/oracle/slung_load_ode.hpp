@@ -63,9 +63,9 @@ inline State advance(const State& state, const State& derivative, double h) {
 /// One classical fourth-order Runge-Kutta step of `h` seconds under a force that may depend on time
 /// and state: `force_at(tau, state)` is the total force `tau` seconds into the step.
 /// The step violates the rod constraint to order h⁵ and restores it at its end.
-template <typename ForceAt>
+template <typename ForceAt, typename Parameters>
 State rk4_step_with(const State& state, const ForceAt& force_at, double h,
-                    const model::SlungLoadParameters& parameters) {
+                    const Parameters& parameters) {
   const auto slope = [&](double tau, const State& at) {
     return calc_derivative(at, force_at(tau, at), parameters);
   };
@@ -81,8 +81,9 @@ State rk4_step_with(const State& state, const ForceAt& force_at, double h,
 }
 
 /// The same with a constant force (zero-order hold).
-inline State rk4_step(const State& state, const Eigen::Vector3d& f_Q_W, double h,
-                      const model::SlungLoadParameters& parameters) {
+template <typename Parameters>
+State rk4_step(const State& state, const Eigen::Vector3d& f_Q_W, double h,
+               const Parameters& parameters) {
   return rk4_step_with(
       state, [&](double, const State&) { return f_Q_W; }, h, parameters);
 }

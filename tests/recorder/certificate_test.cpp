@@ -4,10 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <map>
 #include <nlohmann/json.hpp>
 
-#include "common/text/sha256.hpp"
 #include "tests/recorder/csv_table.hpp"
 #include "tests/recorder/flights.hpp"
 #include "tests/support/temporary_folder.hpp"

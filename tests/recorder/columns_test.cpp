@@ -4,8 +4,6 @@
 #include <gtest/gtest.h>
 
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include "common/config/config_error.hpp"
 #include "recorder/rows.hpp"

@@ -6,7 +6,6 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "common/app/run_main.hpp"
 #include "common/text/sha256.hpp"
 #include "recorder/verification.hpp"
 #include "tests/recorder/flights.hpp"

@@ -26,15 +26,11 @@ class RecordingFolderTest : public testing::Test {
  protected:
   /// The message of the ConfigError, or "no error". Expects one line that names the place.
   std::string find_error(const fs::path& folder, bool force = false) {
-    try {
-      prepare_recording_folder(folder, force);
-    } catch (const config::ConfigError& error) {
-      const std::string text = error.what();
-      EXPECT_NE(text.find("--out " + folder.string()), std::string::npos) << text;
-      EXPECT_EQ(text.find('\n'), std::string::npos) << text;
-      return text;
-    }
-    return "no error";
+    const std::string text = sls::test::find_error<config::ConfigError>(
+        [&] { prepare_recording_folder(folder, force); });
+    if (text != "no error") EXPECT_NE(text.find("--out " + folder.string()), text.npos) << text;
+    EXPECT_EQ(text.find('\n'), text.npos) << text;
+    return text;
   }
 
   void fill(const fs::path& folder) {

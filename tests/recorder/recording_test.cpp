@@ -4,11 +4,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <memory>
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "common/bus/convert.hpp"
 #include "common/text/sha256.hpp"
 #include "tests/recorder/csv_table.hpp"
 #include "tests/recorder/file_size_limit.hpp"

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "tests/security/secured_run.hpp"
-#include "tests/support/waiting.hpp"
+#include "tests/security/keys.hpp"
+#include "tests/system/flight.hpp"
 
 namespace sls::test {
 namespace {

@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "tests/security/keys.hpp"
 #include "tests/system/flight.hpp"

@@ -2,14 +2,11 @@
 /// hosts of the flight and that host.
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cstdint>
 #include <cstring>
 
 #include "tests/network/hosts_flight.hpp"
 #include "tests/security/keys.hpp"
-#include "tests/security/secured_run.hpp"
-#include "tests/support/waiting.hpp"
 
 namespace sls::test {
 namespace {

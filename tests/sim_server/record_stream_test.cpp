@@ -4,10 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <memory>
-#include <mutex>
-#include <vector>
 
-#include "common/bus/message_size.hpp"
 #include "common/bus/qos_file.hpp"
 #include "tests/support/own_domain.hpp"
 #include "tests/support/waiting.hpp"

@@ -2,11 +2,10 @@
 
 #include <gtest/gtest.h>
 
-#include <atomic>
-#include <numeric>
 #include <stdexcept>
 #include <string>
-#include <thread>
+
+#include "tests/support/errors.hpp"
 
 namespace sls::sim {
 namespace {
@@ -40,12 +39,8 @@ TEST(WorkerPoolTest, TheErrorOfTheLowestItemIsThrownAfterAllHaveEnded) {
     ++calls;
     if (i >= 4) throw std::runtime_error(std::to_string(i));
   };
-  try {
-    pool.for_each(9, fail_from_four_on);
-    FAIL() << "expected an error";
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "4");
-  }
+  EXPECT_EQ(test::find_error<std::runtime_error>([&] { pool.for_each(9, fail_from_four_on); }),
+            "4");
   EXPECT_EQ(calls, 9);
   pool.for_each(3, [&](std::size_t) { ++calls; });  // the pool still works
   EXPECT_EQ(calls, 12);

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 
-#include <algorithm>
-#include <cstdlib>
 #include <map>
 
 #include "common/config/scenario.hpp"

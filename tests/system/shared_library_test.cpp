@@ -61,11 +61,6 @@ TEST_P(CrashTest, IsNamedWithLibraryFunctionVehicleAndStep) {
   EXPECT_EQ(outcome.code, 128 + signal_);
   EXPECT_EQ(outcome.output,
             "closed_loop: error: " + kPlant + ": advance, vehicle 0, step 8" + crashed_);
-
-  outcome = fly(make_autopilot_scenario(folder_, "in: step, at: 8, do: " + how_));
-  EXPECT_EQ(outcome.code, 128 + signal_);
-  EXPECT_EQ(outcome.output,
-            "closed_loop: error: " + kAutopilot + ": step, vehicle 0, step 8" + crashed_);
 }
 
 TEST_P(CrashTest, InOneProcessKeepsTheRowsBeforeIt) {

@@ -3,7 +3,6 @@
 #include <signal.h>
 
 #include <string>
-#include <utility>
 
 #include "tests/system/flight.hpp"
 #include "tests/system/operator.hpp"

@@ -25,7 +25,6 @@
 #include "common/bus/fastdds/stale_segments.hpp"
 #include "common/bus/node.hpp"
 #include "common/bus/topics.hpp"
-#include "common/config/config_error.hpp"
 #include "fastdds_announcements.hpp"
 #include "fastdds_api.hpp"
 #include "tools/doctor/file_qos.hpp"

@@ -3,7 +3,6 @@
 #include <spdlog/fmt/fmt.h>
 
 #include <algorithm>
-#include <utility>
 
 #include "common/bus/topics.hpp"
 #include "common/config/yaml_node.hpp"

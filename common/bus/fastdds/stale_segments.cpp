@@ -1,9 +1,6 @@
 #include "common/bus/fastdds/stale_segments.hpp"
 
-#include <sys/stat.h>
-
 #include <chrono>
-#include <cstdint>
 #include <string>
 #include <string_view>
 #include <system_error>

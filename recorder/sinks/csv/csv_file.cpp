@@ -1,6 +1,5 @@
 #include "recorder/sinks/csv/csv_file.hpp"
 
-#include <algorithm>
 #include <array>
 #include <cstring>
 #include <utility>

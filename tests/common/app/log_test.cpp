@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <functional>
-#include <string>
 
 namespace sls::app {
 namespace {

@@ -11,7 +11,6 @@
 #include <cstdlib>
 #include <new>
 #include <sstream>
-#include <stdexcept>
 #include <system_error>
 #include <thread>
 #include <vector>

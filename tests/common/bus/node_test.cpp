@@ -10,12 +10,8 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <fstream>
-#include <functional>
 #include <mutex>
-#include <set>
-#include <vector>
 
 #include "common/bus/fastdds/guarded_transports.hpp"
 #include "common/config/config_error.hpp"

@@ -6,8 +6,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
-#include <optional>
 
 #include "tests/support/own_domain.hpp"
 #include "tests/support/waiting.hpp"

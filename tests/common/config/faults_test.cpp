@@ -123,7 +123,7 @@ TEST(FaultsTest, AMissingFileIsNamed) {
 }
 
 TEST(FaultsTest, ThePageNamesEveryWord) {
-  const std::string page = config::test::read_text(SLS_SOURCE_DIR "/docs/faults.md");
+  const std::string page = sls::test::read_bytes(SLS_SOURCE_DIR "/docs/faults.md");
   const auto expect_named = [&](const std::string& word) {
     EXPECT_NE(page.find('`' + word + '`'), std::string::npos) << word;
   };

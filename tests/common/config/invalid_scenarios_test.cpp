@@ -107,7 +107,7 @@ TEST(InvalidTextTest, EachNumberOfAGroupIsRefusedWithItsLineIfItIsNone) {
   std::size_t judged = 0;
   for (const std::string name : {"rotors_carry_a_triangle", "two_carry_a_bar", "winch_down",
                                  "lift_and_set_down", "cable_cut"}) {
-    std::string text = read_text(SLS_SOURCE_DIR "/config/scenarios/" + name + ".yaml");
+    std::string text = read_bytes(SLS_SOURCE_DIR "/config/scenarios/" + name + ".yaml");
     if (name == "rotors_carry_a_triangle")
       text = replace_once(text, "model: cables\n",
                           "model: cables\n  restitution: 0.5\n  load_rates_rad_s: [0, 0, 1]\n"

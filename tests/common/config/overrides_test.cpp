@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "tests/common/config/support.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::config::test {
 namespace {
@@ -13,13 +14,11 @@ Scenario make_scenario() { return parse_scenario(kMinimalScenario, "file"); }
 
 std::string find_override_error(double period_s, const Scenario& before = make_scenario()) {
   Scenario scenario = before;
-  try {
-    override_period(scenario, period_s);
-  } catch (const ConfigError& error) {
-    EXPECT_TRUE(are_equal(scenario, before)) << "changed in spite of the error";
-    return error.what();
-  }
-  return "no error";
+  const std::string error =
+      sls::test::find_error<ConfigError>([&] { override_period(scenario, period_s); });
+  EXPECT_TRUE(error == "no error" || are_equal(scenario, before))
+      << "changed in spite of " << error;
+  return error;
 }
 
 TEST(OverridePeriodTest, LongerPeriodKeepsTheStep) {
@@ -104,14 +103,10 @@ TEST(OverridePeriodTest, TheStepInForceMustFitThePeriodOfTheAutopilot) {
 std::string find_factor_error(SyncMode mode, double factor) {
   Scenario scenario = parse_scenario(kMinimalScenario, "file");
   scenario.sync.mode = mode;
-  try {
-    override_real_time_factor(scenario, factor);
-  } catch (const ConfigError& error) {
-    EXPECT_EQ(scenario.sync.real_time_factor, 1.0) << "changed in spite of the error";
-    return error.what();
-  }
-  EXPECT_EQ(scenario.sync.real_time_factor, factor);
-  return "no error";
+  const std::string error =
+      sls::test::find_error<ConfigError>([&] { override_real_time_factor(scenario, factor); });
+  EXPECT_EQ(scenario.sync.real_time_factor, error == "no error" ? factor : 1.0) << error;
+  return error;
 }
 
 TEST(OverrideRealTimeFactorTest, AcceptsTheValuesOfTheKey) {

@@ -28,7 +28,7 @@ std::string make_number(std::mt19937_64& random, bool is_time) {
 
 TEST(RoundTripTest, EachNumberOfAWrittenScenarioIsReadAndWritten) {
   std::vector<std::string> texts{kEveryKey, kEveryMultirotorKey};
-  for (const auto& file : list_yaml_files("config/scenarios")) texts.push_back(read_text(file));
+  for (const auto& file : list_yaml_files("config/scenarios")) texts.push_back(read_bytes(file));
   std::mt19937_64 random(20240607);
   const std::regex number(R"([ \[](-?[0-9][0-9.e-]*)(?=[,\]\n]))");
   std::set<std::string> accepted;  // keys
@@ -77,7 +77,7 @@ TEST(RoundTripTest, ShippedScenariosWrittenAndReadAreEqual) {
 }
 
 TEST(RoundTripTest, ALoadOnEqualCablesNeedsNoListOfThem) {
-  std::string text = read_text(std::string(SLS_SOURCE_DIR) + "/config/scenarios/slack_drop.yaml");
+  std::string text = read_bytes(std::string(SLS_SOURCE_DIR) + "/config/scenarios/slack_drop.yaml");
   const std::size_t from = text.find("  cables: [");
   text.erase(from, text.find('\n', from) - from);
   const Scenario scenario = parse_scenario(text, "file");
@@ -113,7 +113,7 @@ void mutate(std::string& text, std::mt19937_64& random) {
 
 TEST(MutationTest, SpoiltScenariosGiveAScenarioOrOneLineOfError) {
   std::vector<std::string> texts;
-  for (const auto& file : list_yaml_files("config/scenarios")) texts.push_back(read_text(file));
+  for (const auto& file : list_yaml_files("config/scenarios")) texts.push_back(read_bytes(file));
   ASSERT_FALSE(texts.empty());
 
   std::mt19937_64 random(4);

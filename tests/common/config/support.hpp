@@ -8,12 +8,14 @@
 #include "common/config/scenario.hpp"
 #include "control_client/laws/qsf/keys.hpp"
 #include "sim_server/plants/slung_load/keys.hpp"
+#include "tests/support/temporary_folder.hpp"
 #include "tests/support/text.hpp"
 
 namespace sls::config::test {
 
 using control::NamedGains;
 using control::QsfKeys;
+using sls::test::read_bytes;
 using sls::test::replace_once;
 
 /// Equal in every key.
@@ -24,8 +26,6 @@ std::string find_error(const std::string& text);
 
 /// The YAML files of `folder`, a path from the root of the repository, by name.
 std::vector<std::filesystem::path> list_yaml_files(const std::string& folder);
-
-std::string read_text(const std::filesystem::path& file);
 
 /// Every key of the plant `slung_load`, then of `multirotor` with the autopilot `px4`, each with a
 /// value that is not its default.

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "closed_loop/flight.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls {
 namespace {
@@ -21,12 +22,7 @@ config::Scenario parse(const std::string& controller) {
 }
 
 std::string find_error(const std::string& controller) {
-  try {
-    parse(controller);
-  } catch (const config::ConfigError& error) {
-    return error.what();
-  }
-  return "none";
+  return test::find_error<config::ConfigError>([&] { parse(controller); });
 }
 
 /// Free fall with g (1 − share): both masses move alike, since the rod is vertical.

@@ -1,14 +1,12 @@
 #include "common/plugin/shared_library.hpp"
 
 #include <gtest/gtest.h>
-#include <locale.h>
 #include <signal.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <cfenv>
 #include <chrono>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <thread>

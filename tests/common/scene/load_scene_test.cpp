@@ -5,10 +5,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iterator>
 #include <random>
 #include <string>
+
+#include "tests/support/temporary_folder.hpp"
 
 namespace sls::scene {
 namespace {
@@ -73,9 +73,9 @@ TEST(HangingPointsTest, ACableNoLongerThanTheDistanceIsStraight) {
 }
 
 Parameters make_parameters(const std::string& scenario) {
-  std::ifstream file(SLS_SOURCE_DIR "/config/scenarios/" + scenario + ".yaml");
   Parameters parameters;
-  parameters.scenario_text(std::string(std::istreambuf_iterator<char>(file), {}));
+  parameters.scenario_text(
+      sls::test::read_bytes(SLS_SOURCE_DIR "/config/scenarios/" + scenario + ".yaml"));
   return parameters;
 }
 

@@ -4,6 +4,7 @@
 
 #include "common/config/scenario.hpp"
 #include "tests/common/config/support.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::text {
 namespace {
@@ -32,18 +33,15 @@ TEST(Sha256Test, PiecesGiveTheHashOfTheWhole) {
 TEST(Sha256Test, ScenarioCarriesTheHashOfItsFilesBytes) {
   for (const auto& file : config::test::list_yaml_files("config/scenarios")) {
     const config::Scenario scenario = config::load_scenario(file);
-    EXPECT_EQ(scenario.text, config::test::read_text(file));
+    EXPECT_EQ(scenario.text, test::read_bytes(file));
     EXPECT_EQ(scenario.sha256, calc_file_sha256(file));
   }
 }
 
 TEST(Sha256Test, MissingFileIsNamed) {
-  try {
-    calc_file_sha256("/nowhere/nothing.yaml");
-    FAIL() << "no error";
-  } catch (const std::system_error& error) {
-    EXPECT_NE(std::string(error.what()).find("/nowhere/nothing.yaml"), std::string::npos);
-  }
+  const std::string error =
+      test::find_error<std::system_error>([] { calc_file_sha256("/nowhere/nothing.yaml"); });
+  EXPECT_NE(error.find("/nowhere/nothing.yaml"), error.npos) << error;
 }
 
 }  // namespace

@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <Eigen/QR>
 #include <algorithm>
@@ -174,24 +173,11 @@ Vector3d solve_for_force(const Case& one) {
 /// (1 / q_z² = 58) and for s down to g / 20.
 constexpr double kRounding = 1.1e-16 * 58 * 20;
 
-TEST(QsfLawTest, AgreesWithAnIndependentFormulation) {
-  std::mt19937 generator(1);
-  double worst = 0.0;
-  for (int i = 0; i < 1000; ++i) {
-    const Case one = draw_case(generator, false);
-    const QsfOutput output = calc_qsf(one.input(), one.vehicle, one.gains);
-    ASSERT_EQ(output.error_code, ErrorCode::kNone);
-    const Vector3d expected = solve_for_force(one);
-    worst = std::max(worst, (output.f_Q_W - expected).norm() / expected.norm());
-  }
-  EXPECT_LE(worst, kRounding);
-}
-
-TEST(QsfLawTest, AgreesWithAnIndependentFormulationWithIntegralsAlsoWhereTheyAreClamped) {
+TEST(QsfLawTest, AgreesWithAnIndependentFormulationAlsoWithIntegralsAndWhereTheyAreClamped) {
   std::mt19937 generator(2);
   int clamped = 0, held_back = 0;
-  for (int i = 0; i < 1000; ++i) {
-    const Case one = draw_case(generator, true);
+  for (int i = 0; i < 2000; ++i) {
+    const Case one = draw_case(generator, i % 2 == 0);
     const QsfOutput output = calc_qsf(one.input(), one.vehicle, one.gains);
     ASSERT_EQ(output.error_code, ErrorCode::kNone);
     if (std::abs(one.integral.z()) == kIntegralLimit) {
@@ -205,99 +191,6 @@ TEST(QsfLawTest, AgreesWithAnIndependentFormulationWithIntegralsAlsoWhereTheyAre
 }
 
 // --- the closed loop ---------------------------------------------------------------------------
-
-/// A smooth desired motion with exact derivatives, a different frequency on each axis.
-model::Reference calc_wave(const Vector3d& centre, const Vector3d& amplitude, const Vector3d& omega,
-                           double t) {
-  model::Reference wave;
-  for (int i = 0; i < 3; ++i) {
-    const double w = omega[i], sine = std::sin(w * t + i), cosine = std::cos(w * t + i);
-    wave.position[i] = centre[i] + amplitude[i] * sine;
-    wave.velocity[i] = amplitude[i] * w * cosine;
-    wave.acceleration[i] = -amplitude[i] * w * w * sine;
-    wave.jerk[i] = -amplitude[i] * w * w * w * cosine;
-    wave.snap[i] = amplitude[i] * w * w * w * w * sine;
-  }
-  return wave;
-}
-
-TEST(QsfLawTest, ErrorObeysTheDesignedLinearEquation) {
-  // The law drives the oracle with continuous feedback forwards and backwards in time. Jerk and
-  // snap of the load are differences, of order 8, of the load's acceleration along that motion.
-  std::mt19937 generator(3);
-  const double h = 0.025;
-  const int substeps = 50;
-  double worst_vertical = 0.0, worst_horizontal = 0.0;
-  int judged = 0;
-  while (judged < 150) {
-    // Rod and support stay far from the singularities during the 0.2 s of the differences.
-    Case one = draw_case(generator, false);
-    const model::RodAngles rod = one.input().rod;
-    if (std::max(std::abs(rod.alpha), std::abs(rod.beta)) > 0.7) continue;
-    one.gains = make_named_gains(LqrWeights{});  // moderate: |poles| up to 2.3
-    const Vector3d amplitude = draw_uniform_vector(generator, 0.5),
-                   omega = draw_uniform_vector(generator, 1.5);
-    const Vector3d centre = one.reference.position;
-    const auto calc_force = [&](double t, const oracle::State& state) -> Vector3d {
-      Case now = one;
-      now.state = state;
-      now.reference = calc_wave(centre, amplitude, omega, t);
-      return calc_qsf(now.input(), one.vehicle, one.gains).f_Q_W;
-    };
-    const auto calc_acceleration = [&](double t, const oracle::State& state) {
-      return oracle::calc_accelerations(state, calc_force(t, state), one.vehicle).a_WL;
-    };
-    one.reference = calc_wave(centre, amplitude, omega, 0.0);
-    std::array<Vector3d, 9> a;  // at −4h … 4h
-    a[4] = calc_acceleration(0.0, one.state);
-    if (a[4].z() > one.vehicle.gravity / 2) continue;
-    ++judged;
-    for (const int side : {-1, 1}) {
-      oracle::State state = one.state;
-      const double step = side * h / substeps;
-      for (int k = 1; k <= 4; ++k) {
-        for (int j = 0; j < substeps; ++j) {
-          const double t = side * (k - 1) * h + j * step;
-          state = oracle::rk4_step_with(
-              state, [&](double tau, const oracle::State& at) { return calc_force(t + tau, at); },
-              step, one.vehicle);
-        }
-        a[4 + side * k] = calc_acceleration(side * k * h, state);
-      }
-    }
-    const Vector3d jerk = (4.0 / 5 * (a[5] - a[3]) - 1.0 / 5 * (a[6] - a[2]) +
-                           4.0 / 105 * (a[7] - a[1]) - 1.0 / 280 * (a[8] - a[0])) /
-                          h;
-    const Vector3d snap = (-205.0 / 72 * a[4] + 8.0 / 5 * (a[5] + a[3]) - 1.0 / 5 * (a[6] + a[2]) +
-                           8.0 / 315 * (a[7] + a[1]) - 1.0 / 560 * (a[8] + a[0])) /
-                          (h * h);
-
-    const Vector3d e =
-        one.state.p_WQ + one.vehicle.rod_length * one.state.n_W - one.reference.position;
-    const Vector3d e_dot =
-        one.state.v_WQ + one.vehicle.rod_length * one.state.n_dot_W - one.reference.velocity;
-    const Vector3d e_ddot = a[4] - one.reference.acceleration;
-    const Vector3d e_dddot = jerk - one.reference.jerk, e_ddddot = snap - one.reference.snap;
-    const AxisGains& z = one.gains.vertical;
-    const AxisGains& xy = one.gains.horizontal;
-    worst_vertical = std::max(worst_vertical,
-                              std::abs(e_ddot.z() + z.velocity * e_dot.z() + z.position * e.z()) /
-                                  (std::abs(e_ddot.z()) + z.velocity * std::abs(e_dot.z()) +
-                                   z.position * std::abs(e.z()) + one.vehicle.gravity));
-    const Vector3d residual = e_ddddot + xy.jerk * e_dddot + xy.acceleration * e_ddot +
-                              xy.velocity * e_dot + xy.position * e;
-    const double size = e_ddddot.head<2>().norm() + xy.jerk * e_dddot.head<2>().norm() +
-                        xy.acceleration * e_ddot.head<2>().norm() +
-                        xy.velocity * e_dot.head<2>().norm() + xy.position * e.head<2>().norm();
-    worst_horizontal = std::max(worst_horizontal, residual.head<2>().norm() / size);
-  }
-  EXPECT_LE(worst_vertical, 1e-13);  // no differences here: rounding alone
-  // Rounding: 4e-15 for an acceleration of some 20 m/s², divided by h² = 6e-4, relative to terms of
-  // some 10 m/s⁴, is 1e-12, the error of most cases. With a fast rod the integration adds up to
-  // 4e-11, and 16 times more at twice its step. Truncation is smaller: the load moves like
-  // exp 2.3 t at most.
-  EXPECT_LE(worst_horizontal, 1e-9);
-}
 
 /// Roots of s^n + c[n−1] s^(n−1) + … + c[0].
 std::vector<std::complex<double>> calc_roots(const std::vector<double>& c) {
@@ -366,25 +259,6 @@ TEST(QsfLawTest, HoversWithTheWeightOfBoth) {
   const QsfOutput output = calc_qsf(one.input(), one.vehicle, one.gains);
   EXPECT_LE((output.f_Q_W - Vector3d(0.0, 0.0, -1.7 * 9.8)).norm(), 1e-14);
   EXPECT_EQ(output.load_error, Vector3d::Zero());
-}
-
-TEST(QsfLawTest, TurnsWithTheSceneAboutTheVertical) {
-  // Same gains in x and y: turning everything about z turns the force.
-  std::mt19937 generator(4);
-  for (int i = 0; i < 200; ++i) {
-    const Case one = draw_case(generator, false);
-    const Eigen::Matrix3d R = Eigen::AngleAxisd(0.1 * i, Vector3d::UnitZ()).toRotationMatrix();
-    Case turned = one;
-    for (Vector3d* vector :
-         {&turned.state.p_WQ, &turned.state.v_WQ, &turned.state.n_W, &turned.state.n_dot_W,
-          &turned.reference.position, &turned.reference.velocity, &turned.reference.acceleration,
-          &turned.reference.jerk, &turned.reference.snap}) {
-      *vector = R * *vector;
-    }
-    const Vector3d force = calc_qsf(one.input(), one.vehicle, one.gains).f_Q_W;
-    const Vector3d turned_force = calc_qsf(turned.input(), one.vehicle, one.gains).f_Q_W;
-    ASSERT_LE((turned_force - R * force).norm(), 1e-11 * force.norm());
-  }
 }
 
 TEST(QsfLawTest, SeesTheLoadWhereItsOwnModelPutsIt) {

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/sim_server/autopilots/airframes.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::sim::geometric {
 namespace {
@@ -105,7 +106,11 @@ TEST(AllocationTest, FramesThatCannotRollOrPitchAreRefused) {
   for (const int axis : {0, 1}) {
     Airframe airframe = make_published_airframe();
     for (Rotor& rotor : airframe.rotors) rotor.p_BR[axis] = 0.0;
-    EXPECT_THROW(Allocation{make_setup(airframe)}, config::ConfigError);
+    AutopilotSetup setup = make_setup(airframe);
+    setup.autopilot.model.place = "file:7";
+    EXPECT_EQ(
+        sls::test::find_error<config::ConfigError>([&] { Allocation{setup}; }),
+        "file:7: plant.rotors: expected rotors that roll and pitch the body, got 4 that cannot");
   }
   Airframe single = make_published_airframe();
   single.rotors.resize(1);

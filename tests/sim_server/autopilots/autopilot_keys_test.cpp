@@ -64,53 +64,6 @@ TEST(Px4KeysTest, DefaultsAreThePublishedFlights) {
   EXPECT_EQ(keys.speeds.speed_per_output, 1000.0);
 }
 
-TEST(Px4KeysTest, EveryKeyIsReadAndSurvivesBeingWritten) {
-  const config::Autopilot autopilot = read_twice(R"(  model: px4
-  period_s: 0.002
-  thrust_map: affine
-  affine_thrust: { force_n: 10, thrust: 0.5, force_per_thrust_n: 30 }
-  attitude: { gains_per_s: [1, 2, 3], yaw_weight: 0.5, rate_limits_rad_s: [4, 5, 6] }
-  rates:
-    proportional_per_rad_s: [0.1, 0.2, 0.3]
-    integral_per_rad: [0.4, 0.5, 0.6]
-    derivative_per_rad_s2: [0.01, 0.02, 0.03]
-    integral_limits: [0.7, 0.8, 0.9]
-    integral_off_error_rad_s: 5
-    rate_cut_off_hz: 60
-    derivative_cut_off_hz: 0
-  mixer:
-    - { roll: -0.438, pitch: 0.707, yaw: 0.909 }
-    - { roll: 0.438, pitch: -0.707, yaw: 1 }
-    - { roll: 0.438, pitch: 0.707, yaw: -0.909 }
-    - { roll: -0.438, pitch: -0.707, yaw: -1, thrust: 0.9 }
-  rotor_speeds: { at_zero_rad_s: 50, per_output_rad_s: 900 }
-)");
-  EXPECT_EQ(autopilot.period_ns, 2'000'000);
-  const auto& keys = autopilot.own.get<px4::Keys>();
-  EXPECT_EQ(keys.thrust_map, px4::ThrustMap::kAffine);
-  EXPECT_EQ(keys.affine_thrust->force, 10.0);
-  EXPECT_EQ(keys.affine_thrust->thrust, 0.5);
-  EXPECT_EQ(keys.affine_thrust->force_per_thrust, 30.0);
-  EXPECT_EQ(keys.attitude.per_rad, Eigen::Vector3d(1, 2, 3));
-  EXPECT_EQ(keys.attitude.yaw_weight, 0.5);
-  EXPECT_EQ(keys.attitude.rate_limits, Eigen::Vector3d(4, 5, 6));
-  EXPECT_EQ(keys.rates.proportional, Eigen::Vector3d(0.1, 0.2, 0.3));
-  EXPECT_EQ(keys.rates.integral, Eigen::Vector3d(0.4, 0.5, 0.6));
-  EXPECT_EQ(keys.rates.derivative, Eigen::Vector3d(0.01, 0.02, 0.03));
-  EXPECT_EQ(keys.rates.integral_limits, Eigen::Vector3d(0.7, 0.8, 0.9));
-  EXPECT_EQ(keys.rates.integral_off_error, 5.0);
-  EXPECT_EQ(keys.rates.rate_cut_off, 60.0);
-  EXPECT_EQ(keys.rates.derivative_cut_off, 0.0);
-  ASSERT_EQ(keys.mixer->size(), 4u);
-  EXPECT_EQ(keys.mixer->at(0).roll, -0.438);
-  EXPECT_EQ(keys.mixer->at(0).pitch, 0.707);
-  EXPECT_EQ(keys.mixer->at(0).yaw, 0.909);
-  EXPECT_EQ(keys.mixer->at(0).thrust, 1.0);
-  EXPECT_EQ(keys.mixer->at(3).thrust, 0.9);
-  EXPECT_EQ(keys.speeds.speed_at_zero, 50.0);
-  EXPECT_EQ(keys.speeds.speed_per_output, 900.0);
-}
-
 TEST(GeometricKeysTest, GainsFollowFromTheInertiaUnlessTheFileSetsThem) {
   const config::Autopilot usual = read_twice("  model: geometric\n");
   EXPECT_EQ(usual.period_ns, 4'000'000);

@@ -56,25 +56,6 @@ TEST(FirstOrderTest, TurnsInAPlaneByTheAngleOfTheNormalisedSum) {
             1e-4);
 }
 
-TEST(FirstOrderTest, FollowsASmallSineLikeTheDiscreteFilter) {
-  // Steady response of x' = u + κ (x − u) to a u that turns by z = e^(iωT) per step.
-  const double kept = std::exp(-kPeriod / kLag), tilt = 1e-5, turn = 2.0 * M_PI * kPeriod;
-  const auto autopilot = make_lagging(kLag);
-  for (int k = 0; k <= 3000; ++k) {
-    const Vector3d direction =
-        *autopilot->step(make_input(make_force(tilt * std::sin(turn * k)))).direction_W;
-    if (k < 2000) continue;  // κ^2000 < 1e-22
-    const double c = std::cos(turn), s = std::sin(turn);
-    const double norm = 1.0 - 2.0 * kept * c + kept * kept;
-    const double gain_of_sine = (1.0 - kept) * (1.0 - kept * c) / norm;
-    const double gain_of_cosine = -(1.0 - kept) * kept * s / norm;
-    ASSERT_NEAR(calc_tilt(direction),
-                tilt * (gain_of_sine * std::sin(turn * k) + gain_of_cosine * std::cos(turn * k)),
-                kRounding)
-        << k;
-  }
-}
-
 TEST(FirstOrderTest, TheThrustDoesNotLagAndEveryRotorGivesAnEqualShare) {
   const AutopilotSetup setup = make_setup("first_order", FirstOrderKeys{kLag});
   const auto autopilot = make_autopilot(setup);

@@ -31,19 +31,6 @@ Turning fly_period(Autopilot& autopilot, const Vector3d& f_Q_W, const Turning& t
   return next;
 }
 
-TEST(GeometricTest, RecoversFromATiltOf179Degrees) {
-  const Vector3d hover(0, 0, -16.67);
-  for (double heading = 0.0; heading < 2 * kPi; heading += 0.3) {
-    const auto autopilot = make_autopilot(make_geometric_setup());
-    const Vector3d axis(std::cos(heading), std::sin(heading), 0.0);
-    Turning turning;
-    turning.R = Eigen::AngleAxisd(179.0 * kPi / 180, axis).toRotationMatrix();
-    for (int n = 0; n < 1000; ++n) turning = fly_period(*autopilot, hover, turning);
-    EXPECT_LT(calc_attitude_distance(turning.R, Matrix3d::Identity()), 1e-9) << heading;
-    EXPECT_LT(turning.w.norm(), 1e-4);
-  }
-}
-
 TEST(GeometricTest, ComesBackFromAnyAttitudeAndGivesTheForceThatIsAskedFor) {
   std::mt19937_64 random(61);
   const Vector3d f_Q_W(2.0, -3.0, -15.0);
@@ -94,20 +81,6 @@ TEST(GeometricTest, IsAPureFunctionOfItsSteps) {
     const AutopilotOutput first = one->step(input);
     ASSERT_TRUE(is_same(first, two->step(input))) << n;
     ASSERT_TRUE(first.rotor_speeds.allFinite());
-  }
-}
-
-TEST(GeometricTest, FramesThatCannotRollAreRefusedWithTheKey) {
-  AutopilotSetup setup = make_geometric_setup();
-  setup.autopilot.model.place = "file:7";
-  for (Rotor& rotor : setup.airframe.rotors) rotor.p_BR.y() = 0.0;
-  try {
-    make_autopilot(setup);
-    FAIL();
-  } catch (const config::ConfigError& error) {
-    EXPECT_STREQ(error.what(),
-                 "file:7: plant.rotors: expected rotors that roll and pitch the body, got 4 that "
-                 "cannot");
   }
 }
 

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "tests/sim_server/autopilots/airframes.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::sim::px4 {
 namespace {
@@ -109,14 +110,9 @@ TEST(MixerRowsTest, RotorsInALineAreRefused) {
   for (Rotor& rotor : airframe.rotors) rotor.p_BR.x() = 0.0;
   AutopilotSetup setup = make_setup(airframe);
   setup.autopilot.model.place = "file:7";
-  try {
-    make_mixer(setup);
-    FAIL();
-  } catch (const config::ConfigError& error) {
-    EXPECT_STREQ(error.what(),
-                 "file:7: plant.rotors: expected rotors that roll and pitch the body, got 4 that "
-                 "cannot");
-  }
+  EXPECT_EQ(
+      sls::test::find_error<config::ConfigError>([&] { make_mixer(setup); }),
+      "file:7: plant.rotors: expected rotors that roll and pitch the body, got 4 that cannot");
 }
 
 TEST(MixerTest, AddsUpWhereNothingSaturates) {

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "tests/sim_server/autopilots/support.hpp"
 
 namespace sls::sim {

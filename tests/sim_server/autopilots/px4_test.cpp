@@ -3,6 +3,7 @@
 
 #include "sim_server/autopilots/px4/keys.hpp"
 #include "tests/sim_server/autopilots/airframes.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::sim::px4 {
 namespace {
@@ -109,13 +110,8 @@ TEST_F(Px4Test, RefusesAMixerForAnotherNumberOfRotors) {
   keys.mixer = std::vector<MixerRow>(3);
   AutopilotSetup setup = make_setup_with(keys);
   setup.autopilot.model.place = "file:9";
-  try {
-    make_autopilot(setup);
-    FAIL();
-  } catch (const config::ConfigError& error) {
-    EXPECT_STREQ(error.what(),
-                 "file:9: autopilot.mixer: expected a row for each of the 4 rotors, got 3");
-  }
+  EXPECT_EQ(sls::test::find_error<config::ConfigError>([&] { make_autopilot(setup); }),
+            "file:9: autopilot.mixer: expected a row for each of the 4 rotors, got 3");
 }
 
 }  // namespace

@@ -2,12 +2,9 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Geometry>
-#include <limits>
-
-#include "common/model/forces.hpp"
 #include "common/model/invariants.hpp"
 #include "tests/sim_server/plants/plant_flights.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::sim {
 namespace {
@@ -24,8 +21,11 @@ config::Plant make_tilted_plant() {
   return plant;
 }
 
-/// Largest distance of any body between `plant` and Simbody during 32 s of shaking, m.
-double calc_largest_difference(const config::Plant& config) {
+TEST(AnalyticPlantTest, FollowsSimbodyForThirtyTwoSecondsWithDragWindAndDisturbance) {
+  config::Plant config = make_tilted_plant();
+  config.air.rotor_drag = 0.3;
+  config.air.v_wind_W = {2.0, -1.0, 0.3};
+  config.disturbance_W = {0.3, -0.2, 0.1};
   AnalyticPlant plant(kVehicle, config);
   SlungLoadPlant simbody(kVehicle, config);
   double largest = calc_position_difference(plant.measurement(0), simbody.state());
@@ -40,21 +40,9 @@ double calc_largest_difference(const config::Plant& config) {
     tilt = std::max(tilt, calc_tilt(state.p_WL - state.p_WQ));
   }
   EXPECT_GT(tilt, 0.3) << "the flight does not swing";
-  return largest;
-}
-
-TEST(AnalyticPlantTest, FollowsSimbodyForThirtyTwoSeconds) {
   // Both use fourth-order Runge-Kutta at 1 ms, but different coordinates: their truncation errors
   // differ by about 1e-10 m.
-  EXPECT_LE(calc_largest_difference(make_tilted_plant()), 1e-9);
-}
-
-TEST(AnalyticPlantTest, FollowsSimbodyWithDragWindAndDisturbance) {
-  config::Plant plant = make_tilted_plant();
-  plant.air.rotor_drag = 0.3;
-  plant.air.v_wind_W = {2.0, -1.0, 0.3};
-  plant.disturbance_W = {0.3, -0.2, 0.1};
-  EXPECT_LE(calc_largest_difference(plant), 1e-9);
+  EXPECT_LE(largest, 1e-9);
 }
 
 TEST(AnalyticPlantTest, BeginsWhereTheScenarioPutsEitherBody) {
@@ -70,29 +58,6 @@ TEST(AnalyticPlantTest, BeginsWhereTheScenarioPutsEitherBody) {
     EXPECT_NEAR(state.rod.beta, -0.2, rounding);
     EXPECT_NEAR(state.rod.alpha_dot, 0.5, rounding);
     EXPECT_NEAR(state.rod.beta_dot, 0.4, rounding);
-  }
-}
-
-TEST(AnalyticPlantTest, CirclesOnACone) {
-  // Ω² = (m + m_L) g / (m L cos θ) under F = −(m + m_L) g e₃, about the centre of mass.
-  const double theta = 0.5;
-  const double omega = std::sqrt(kVehicle.total_mass() * kVehicle.gravity /
-                                 (kVehicle.quad_mass * kVehicle.rod_length * std::cos(theta)));
-  config::Plant config;
-  config.initial.rod.beta = theta;
-  config.initial.rod.alpha_dot = -omega * std::sin(theta) / std::cos(theta);
-  const double arm = kVehicle.rod_length * kVehicle.load_mass / kVehicle.total_mass();
-  config.initial.v_WQ = {0.0, -arm * std::sin(theta) * omega, 0.0};
-  AnalyticPlant plant(kVehicle, config);
-  const Vector3d hover = calc_weight_force(kVehicle.total_mass(), kVehicle.gravity);
-  for (int k = 1; k <= 10'000; ++k) {
-    plant.advance({hover}, 1);
-    const model::SlungLoadState& state = plant.measurement(0);
-    const double angle = omega * k * kStep;
-    const Vector3d n_W(std::sin(theta) * std::cos(angle), std::sin(theta) * std::sin(angle),
-                       std::cos(theta));
-    // Phase error (Ωh)⁴/120 per radian: 2e-12, over 36 radians.
-    ASSERT_LE((state.p_WL - state.p_WQ - n_W).norm(), 1e-9) << "step " << k;
   }
 }
 
@@ -153,12 +118,10 @@ TEST(PlantTest, RefusesAForceThatIsNotFiniteAndKeepsItsState) {
     auto plants = make(model, scenario);
     plants[0].plant->advance({Vector3d(0, 0, -16)}, 3);
     const Vector3d before = plants[0].plant->measurement(0).p_WL;
-    try {
-      plants[0].plant->advance({Vector3d(0, std::nan(""), 0)}, 1);
-      FAIL() << model;
-    } catch (const std::runtime_error& error) {
-      EXPECT_STREQ(error.what(), "force_y_n is not finite after step 3 of the plant") << model;
-    }
+    EXPECT_EQ(test::find_error<std::runtime_error>(
+                  [&] { plants[0].plant->advance({Vector3d(0, std::nan(""), 0)}, 1); }),
+              "force_y_n is not finite after step 3 of the plant")
+        << model;
     EXPECT_THROW(plants[0].plant->advance({Vector3d(1e308, 0, 0)}, 5), std::runtime_error);
     EXPECT_TRUE(model::is_finite(plants[0].plant->measurement(0)));
     EXPECT_LE((plants[0].plant->measurement(0).p_WL - before).norm(), 1e-3) << model;
@@ -205,14 +168,11 @@ TEST(PlantTest, APlantOfAllVehiclesIsMadeOnceAndRefusesAPartOfTheFleet) {
     expected[id] += 2.0;
     EXPECT_EQ(plants[0].plant->measurement(id).p_WQ, expected);
   }
-  try {
-    make_plants(swarm, fleet, {0, 2});
-    FAIL() << "flies a part";
-  } catch (const config::ConfigError& error) {
-    EXPECT_STREQ(error.what(),
-                 "plant.model: expected a server of all 3 vehicles, which 'swarm' moves together, "
-                 "got one of 0,2");
-  }
+  EXPECT_EQ(test::find_error<config::ConfigError>([&] {
+              make_plants(swarm, fleet, {0, 2});
+            }),
+            "plant.model: expected a server of all 3 vehicles, which 'swarm' moves together, got "
+            "one of 0,2");
 }
 
 }  // namespace

@@ -149,28 +149,6 @@ TEST(CablesMotionTest, SeesADistanceThatExceedsTheLengthOnlyInsideAStep) {
   EXPECT_LE((end.p_WL - end.vehicles[0].p_W).norm(), 1.0 + 1e-12);
 }
 
-TEST(CablesMotionTest, CirclesOnACone) {
-  // Ω² = (m + m_L) g / (m l cos θ) under F = −(m + m_L) g e₃, about the centre of mass.
-  const double theta = 0.5, total = 2.0;
-  const double omega = std::sqrt(total * 9.8 / (1.5 * std::cos(theta)));
-  const auto direction = [&](double t) {
-    return Vector3d(std::sin(theta) * std::cos(omega * t), std::sin(theta) * std::sin(omega * t),
-                    std::cos(theta));
-  };
-  const Vector3d swing(0.0, omega * std::sin(theta), 0.0);
-  Motion start = make_motion();
-  start.v_WL = 1.5 / total * swing;
-  start.vehicles[0].p_W = -direction(0.0);
-  start.vehicles[0].v_W = -0.5 / total * swing;
-  Flight flight(make_system(), start);
-  for (int k = 1; k <= 10'000; ++k) {
-    flight.fly(make_actions({0.0, 0.0, -total * 9.8}), 0.001);
-    // Phase error (Ωh)⁴/120 per radian: 2e-12, over 36 radians.
-    ASSERT_LE((flight.to_load() - direction(k * 0.001)).norm(), 1e-9) << "step " << k;
-  }
-  EXPECT_TRUE(flight.happened.empty());
-}
-
 /// Forces that hold a ring of vehicles still: each carries itself and its share, and pulls
 /// outwards.
 Actions make_holding(const System& system, double angle) {
@@ -431,28 +409,6 @@ TEST(CablesMotionTest, ConvergesWithTheFourthOrderAwayFromEventsAndAcrossThem) {
   }
 }
 
-TEST(CablesMotionTest, ASymmetricFlightStaysSymmetric) {
-  // Two vehicles, one the mirror image of the other in x, over a bar that jumps and falls.
-  System system = make_system(2);
-  system.is_rigid = true;
-  system.inertia_L = Vector3d(4e-4, 7e-3, 7e-3).asDiagonal();
-  system.inverse_inertia_L = system.inertia_L.inverse();
-  system.attachment_L[0] = {0.19, 0.0, 0.0};
-  system.attachment_L[1] = {-0.19, 0.0, 0.0};
-  system.restitution = 0.5;
-  Motion start = make_ring(system, 0.3);
-  start.v_WL.z() = -2.0;
-  Flight flight(system, start);
-  Actions actions = make_holding(system, 0.3);
-  flight.fly(actions, 1.5);
-  EXPECT_GE(flight.happened.size(), 4u);
-  const Motion& end = flight.motion.motion();
-  const Vector3d mirror(-1.0, 1.0, 1.0);
-  EXPECT_LE((end.vehicles[0].p_W - mirror.cwiseProduct(end.vehicles[1].p_W)).norm(), 1e-11);
-  EXPECT_LE(end.w_WL_L.norm(), 1e-10);
-  EXPECT_LE(std::abs(end.p_WL.x()), 1e-12);
-}
-
 TEST(CablesMotionTest, ATautFlightIsThatOfTheAnalyticPlant) {
   // 32 s of shaking. Both have errors of fourth order at 1 ms in different coordinates.
   const model::SlungLoadParameters vehicle;
@@ -491,26 +447,6 @@ TEST(CablesMotionTest, ATautFlightIsThatOfTheAnalyticPlant) {
   EXPECT_TRUE(flight.happened.empty());
   EXPECT_LE(largest, 1e-8);
   RecordProperty("largest_difference_m", std::to_string(largest * 1e12) + "e-12");
-}
-
-TEST(CablesMotionTest, AWinchPullsTheLoadWithTheAccelerationOfItsCable) {
-  // l = 1 + ½ a t² with a < 0: the load rises to a vehicle held still by the force that its
-  // tension m_L (g − a) needs.
-  Motion start = make_motion();
-  start.vehicles[0].p_W = {0.0, 0.0, -1.0};
-  Flight flight(make_system(), start);
-  const double winch = -2.0, tension = 0.5 * (9.8 - winch);
-  Actions actions = make_actions({0.0, 0.0, -1.5 * 9.8 - tension});
-  actions.length_acceleration[0] = winch;
-  flight.fly(actions, 0.5);
-  const Motion& end = flight.motion.motion();
-  EXPECT_NEAR(flight.motion.tension()[0], tension, 1e-12);
-  EXPECT_NEAR(end.p_WL.z(), 0.5 * winch * 0.25, 1e-13);
-  EXPECT_NEAR(end.vehicles[0].p_W.z(), -1.0, 1e-13);
-  // Its power −T l̇ became energy of the load.
-  const double work = tension * (1.0 - end.vehicles[0].length);
-  const double energy = 0.5 * 0.5 * end.v_WL.squaredNorm() - 0.5 * 9.8 * end.p_WL.z();
-  EXPECT_NEAR(energy, work, 1e-12);
 }
 
 }  // namespace

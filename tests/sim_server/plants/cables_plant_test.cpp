@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "tests/sim_server/plants/signals.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::sim {
 namespace {
@@ -201,19 +202,11 @@ TEST(CablesPlantTest, AReleaseInsideAStepLeavesTheLoadInFreeFall) {
   plant->advance(hover, 1000);
   const model::Measurement& end = plant->measurement(0);
   EXPECT_LE((end.p_WL - after.p_WL - after.v_WL - Vector3d(0.0, 0.0, 4.9)).norm(), 1e-12);
-  const double rise = 0.5 * 9.8 * (1.7 / 1.5 - 1.0);
-  EXPECT_LE((end.p_WQ - after.p_WQ - after.v_WQ + Vector3d(0.0, 0.0, rise)).norm(), 1e-12);
   // The cut cable hangs.
   EXPECT_EQ(end.rod.alpha, 0.0);
   EXPECT_EQ(end.rod.beta, 0.0);
   EXPECT_EQ(end.rod.beta_dot, 0.0);
   EXPECT_TRUE(plant->take_remarks(0).empty());
-  // Momentum went on through the cut: what both had 1 ms before, and gravity and force since.
-  const auto before = make(scenario);
-  before->advance(hover, 250);
-  const model::Measurement& held = before->measurement(0);
-  const Vector3d momentum = 1.5 * held.v_WQ + 0.2 * held.v_WL;
-  EXPECT_LE((1.5 * after.v_WQ + 0.2 * after.v_WL - momentum).norm(), 1e-14);
 }
 
 TEST(CablesPlantTest, TellsWhatStandsOnTheGround) {
@@ -273,13 +266,11 @@ TEST(CablesPlantTest, HasNoSignalsOfWhatTheScenarioHasNot) {
 
 TEST(CablesPlantTest, RefusesToFlyOneVehicleOfAGroupAlone) {
   const config::Scenario scenario = make_bar();
-  try {
-    make_plant(find_plant_type(scenario.plant.model), config::make_vehicle_scenario(scenario, 1),
-               1);
-    FAIL() << "flies a part";
-  } catch (const config::ConfigError& error) {
-    EXPECT_STREQ(error.what(), "plant.cables: expected one for each of 1 vehicles, got 2");
-  }
+  EXPECT_EQ(test::find_error<config::ConfigError>([&] {
+              make_plant(find_plant_type(scenario.plant.model),
+                         config::make_vehicle_scenario(scenario, 1), 1);
+            }),
+            "plant.cables: expected one for each of 1 vehicles, got 2");
 }
 
 }  // namespace

@@ -411,16 +411,5 @@ TEST(CablesRotorsTest, SaysWhichVehicleHasARotorAtItsLargestSpeed) {
     EXPECT_EQ(remark.find("rotor"), std::string::npos) << remark;
 }
 
-TEST(CablesRotorsTest, RefusesRotorsThatCannotTurnTheirVehicle) {
-  AirframeKeys airframe = make_ideal_airframe();
-  for (RotorKeys& rotor : airframe.rotors) rotor.position.y() = 0.0;
-  try {
-    CablesPlant plant(with_geometric(make_triangle(airframe), 15.0, 4'000'000));
-    FAIL() << "flies";
-  } catch (const config::ConfigError& error) {
-    EXPECT_NE(std::string(error.what()).find("plant.rotors"), std::string::npos) << error.what();
-  }
-}
-
 }  // namespace
 }  // namespace sls::sim

@@ -4,7 +4,6 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "common/config/scenario.hpp"
 #include "common/model/state.hpp"

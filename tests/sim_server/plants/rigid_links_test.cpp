@@ -3,17 +3,13 @@
 #include <gtest/gtest.h>
 
 #include "common/config/config_error.hpp"
+#include "tests/support/errors.hpp"
 
 namespace sls::sim {
 namespace {
 
 std::string find_error(const model::SlungLoadParameters& vehicle, const std::string& place = "") {
-  try {
-    check_rigid_vehicle(vehicle, place);
-  } catch (const config::ConfigError& error) {
-    return error.what();
-  }
-  return "no error";
+  return test::find_error<config::ConfigError>([&] { check_rigid_vehicle(vehicle, place); });
 }
 
 TEST(RigidLinksTest, AcceptsThePublishedVehicleWithAndWithoutTheRodsMass) {

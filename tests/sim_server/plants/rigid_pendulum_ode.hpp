@@ -45,28 +45,4 @@ inline State calc_derivative(const State& state, const Eigen::Vector3d& f_Q_W,
   return {state.v_WQ, a_WQ, state.n_dot_W, n_ddot};
 }
 
-/// One classical Runge-Kutta step with the force held; the unit vector is restored at its end.
-inline State rk4_step(const State& state, const Eigen::Vector3d& f_Q_W, double h,
-                      const RigidPendulum& pendulum) {
-  const State k1 = calc_derivative(state, f_Q_W, pendulum);
-  const State k2 = calc_derivative(advance(state, k1, h / 2), f_Q_W, pendulum);
-  const State k3 = calc_derivative(advance(state, k2, h / 2), f_Q_W, pendulum);
-  const State k4 = calc_derivative(advance(state, k3, h), f_Q_W, pendulum);
-  State next = advance(advance(state, k1, h / 6), k4, h / 6);
-  next = advance(advance(next, k2, h / 3), k3, h / 3);
-  next.n_W.normalize();
-  next.n_dot_W -= next.n_W * next.n_W.dot(next.n_dot_W);
-  return next;
-}
-
-/// Kinetic plus potential energy, J.
-inline double calc_energy(const State& state, const RigidPendulum& pendulum) {
-  const Eigen::Vector3d p_WC = state.p_WQ + pendulum.centre * state.n_W;
-  const Eigen::Vector3d v_WC = state.v_WQ + pendulum.centre * state.n_dot_W;
-  return 0.5 * pendulum.quad_mass * state.v_WQ.squaredNorm() +
-         0.5 * pendulum.mass * v_WC.squaredNorm() +
-         0.5 * pendulum.inertia * state.n_dot_W.squaredNorm() -
-         pendulum.gravity * (pendulum.quad_mass * state.p_WQ.z() + pendulum.mass * p_WC.z());
-}
-
 }  // namespace sls::oracle

@@ -3,6 +3,7 @@
 
 #include "sim_server/plants/plant.hpp"
 #include "sim_server/plants/shared_library/sls_plant.h"
+#include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::sim {
@@ -161,12 +162,9 @@ TEST(SharedLibraryPlantTest, AnErrorInFlightNamesFunctionVehicleAndStep) {
 
 TEST(SharedLibraryPlantTest, AForceThatIsNotFiniteIsNotHandedToIt) {
   const auto plants = make_two(make_scenario(kGood));
-  try {
-    plants[0].plant->advance({Eigen::Vector3d(0.0, std::nan(""), 0.0)}, 4);
-    FAIL() << "no error";
-  } catch (const std::runtime_error& error) {
-    EXPECT_STREQ(error.what(), "force_y_n is not finite after step 0 of the plant");
-  }
+  EXPECT_EQ(test::find_error<std::runtime_error>(
+                [&] { plants[0].plant->advance({Eigen::Vector3d(0.0, std::nan(""), 0.0)}, 4); }),
+            "force_y_n is not finite after step 0 of the plant");
 }
 
 }  // namespace

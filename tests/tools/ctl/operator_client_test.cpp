@@ -6,11 +6,11 @@
 #include <spdlog/spdlog.h>
 
 #include <atomic>
-#include <functional>
 #include <sstream>
 #include <thread>
 
 #include "common/app/run_main.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/own_domain.hpp"
 #include "tests/support/waiting.hpp"
 #include "tools/ctl/show_status.hpp"
@@ -19,6 +19,7 @@ namespace sls::ctl {
 namespace {
 
 using namespace std::chrono_literals;
+using sls::test::find_error;
 using sls::test::own_domain;
 using sls::test::wait_until;
 
@@ -134,15 +135,6 @@ class OperatorClientTest : public ::testing::Test {
   // Only a failing test waits for this long limit; tests that expect no reply set a short one.
   explicit OperatorClientTest(double timeout_s = 60.0) : client(node, make_options(timeout_s)) {}
 
-  std::string find_error(const std::function<void()>& act) {
-    try {
-      act();
-    } catch (const app::RunError& error) {
-      return error.what();
-    }
-    return "no error";
-  }
-
   bus::Node node{kQosFile, own_domain(), "operator"};
   OperatorClient client;
 };
@@ -202,28 +194,31 @@ TEST_F(OperatorClientTest, ARunThatEndsBeforeItsReplyIsReported) {
   FakeServer server(
       [](FakeServer& self, const SimControl&) { self.phase = RunPhase::PHASE_FAILED; });
   const auto run = client.wait_for_run().value();
-  EXPECT_EQ(find_error([&] { client.ask(run, ControlAction::ACTION_STEP, 10); }),
+  EXPECT_EQ(find_error<app::RunError>([&] { client.ask(run, ControlAction::ACTION_STEP, 10); }),
             "no reply to step: the run has ended: failed, as told");
 }
 
 TEST_F(ImpatientClientTest, AServerThatDoesNotReplyIsReported) {
   FakeServer server(kKeepSilent);
   const auto run = find_run();
-  const std::string error = find_error([&] { client.ask(run, ControlAction::ACTION_PAUSE); });
+  const std::string error =
+      find_error<app::RunError>([&] { client.ask(run, ControlAction::ACTION_PAUSE); });
   EXPECT_EQ(error.rfind("no reply to pause from the server of run ", 0), 0u) << error;
 }
 
 TEST_F(ImpatientClientTest, AServerThatTakesNoRequestsIsReported) {
   FakeServer server(kKeepSilent, false);
   const auto run = find_run();
-  const std::string error = find_error([&] { client.ask(run, ControlAction::ACTION_PAUSE); });
+  const std::string error =
+      find_error<app::RunError>([&] { client.ask(run, ControlAction::ACTION_PAUSE); });
   EXPECT_NE(error.find("takes no requests: expected it on sls/control"), error.npos) << error;
 }
 
 TEST_F(ImpatientClientTest, StepsEndWithAServerThatFallsSilent) {
   FakeServer server([](FakeServer& self, const SimControl&) { self.is_silent = true; });
   const auto run = find_run();
-  const std::string error = find_error([&] { client.ask(run, ControlAction::ACTION_STEP, 10); });
+  const std::string error =
+      find_error<app::RunError>([&] { client.ask(run, ControlAction::ACTION_STEP, 10); });
   EXPECT_EQ(error.rfind("no reply to step: server of run ", 0), 0u) << error;
   EXPECT_NE(error.find("silent for "), error.npos) << error;
 }
@@ -243,7 +238,7 @@ TEST_F(ImpatientClientTest, StepsMayTakeLongerThanTheTimeout) {
 }
 
 TEST_F(ImpatientClientTest, WithoutAServerDomainAndVehicleAreNamed) {
-  EXPECT_EQ(find_error([&] { client.wait_for_run(); }),
+  EXPECT_EQ(find_error<app::RunError>([&] { client.wait_for_run(); }),
             "no server for vehicle " + std::to_string(kVehicle) + " on domain " +
                 std::to_string(own_domain()) + " within 1 s");
 }

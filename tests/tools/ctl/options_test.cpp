@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "tests/support/errors.hpp"
+
 namespace sls::ctl {
 namespace {
 
@@ -16,12 +18,7 @@ Options parse(const std::string& command_line) {
 }
 
 std::string find_error(const std::string& command_line) {
-  try {
-    parse(command_line);
-  } catch (const CLI::ParseError& error) {
-    return error.what();
-  }
-  return "no error";
+  return test::find_error<CLI::ParseError>([&] { parse(command_line); });
 }
 
 TEST(OperatorOptionsTest, EverySubcommandIsAnAction) {

@@ -1,11 +1,9 @@
 /// Passes the samples of the domain to the sessions, on the server's thread.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <optional>
 #include <string>
 #include <vector>
 

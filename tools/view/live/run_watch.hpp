@@ -1,7 +1,6 @@
 /// Chooses the current run and collects its data.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <deque>
 #include <functional>
@@ -11,7 +10,6 @@
 #include <optional>
 #include <string>
 #include <tuple>
-#include <vector>
 
 #include "common/bus/node.hpp"
 #include "common/bus/participants.hpp"

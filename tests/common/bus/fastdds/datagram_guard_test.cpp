@@ -2,9 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <cstdint>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "common/bus/fastdds/host_id.hpp"

@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "fastcdr_api.hpp"
 #include "fastdds_types.hpp"

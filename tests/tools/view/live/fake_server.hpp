@@ -1,13 +1,12 @@
 /// A fake server on its own node: publishes the messages that the test gives it.
 #pragma once
 
-#include <fstream>
-#include <iterator>
 #include <string>
 #include <vector>
 
 #include "common/app/mailbox.hpp"
 #include "common/bus/node.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 namespace sls::test {
 
@@ -17,11 +16,10 @@ inline const std::string kQosFile = SLS_SOURCE_DIR "/config/qos/default.xml";
 inline Parameters make_parameters(std::uint64_t run_id,
                                   const std::vector<std::uint32_t>& vehicles = {0},
                                   const std::string& scenario = "figure_eight") {
-  std::ifstream file(SLS_SOURCE_DIR "/config/scenarios/" + scenario + ".yaml");
   Parameters parameters;
   parameters.run_id(run_id);
   parameters.contract_sha256(bus::kContractSha256);
-  parameters.scenario_text(std::string(std::istreambuf_iterator<char>(file), {}));
+  parameters.scenario_text(read_bytes(SLS_SOURCE_DIR "/config/scenarios/" + scenario + ".yaml"));
   parameters.period_ns(4'000'000);
   parameters.step_ns(1'000'000);
   for (const std::uint32_t id : vehicles) {

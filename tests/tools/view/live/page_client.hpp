@@ -1,9 +1,7 @@
 /// A fake page for a real sls_view: opens a WebSocket to it and keeps the messages.
 #pragma once
 
-#include <atomic>
 #include <map>
-#include <memory>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <optional>

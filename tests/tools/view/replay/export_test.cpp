@@ -4,7 +4,6 @@
 #include <openssl/evp.h>
 #include <zlib.h>
 
-#include <regex>
 #include <system_error>
 
 #include "common/config/config_error.hpp"

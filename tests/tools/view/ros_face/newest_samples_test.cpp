@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include "common/bus/convert.hpp"
 #include "common/bus/names.hpp"
 #include "fastcdr_api.hpp"
 

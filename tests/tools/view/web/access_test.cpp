@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "common/config/config_error.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace sls::view {
@@ -26,16 +27,6 @@ bool may_look(const std::string& host, const AccessOptions& options = make_optio
 Access judge_page(const std::string& host, const std::string& origin,
                   const AccessOptions& options = make_options()) {
   return judge({host, origin, std::nullopt}, options);
-}
-
-template <class Call>
-std::string find_problem(Call call) {
-  try {
-    call();
-  } catch (const config::ConfigError& error) {
-    return error.what();
-  }
-  return "";
 }
 
 // --- Host ----------------------------------------------------------------------------------------
@@ -220,7 +211,7 @@ TEST(AccessTest, AfterFiveWrongTokensANetworkGetsOneTryASecond) {
 TEST(AccessTest, AnotherAddressNeedsAToken) {
   for (const char* address : {"127.0.0.1", "::1", "localhost", "127.0.0.2"})
     EXPECT_NO_THROW(check(make_options(address))) << address;
-  EXPECT_EQ(find_problem([] { check(make_options("0.0.0.0")); }),
+  EXPECT_EQ(test::find_error<config::ConfigError>([] { check(make_options("0.0.0.0")); }),
             "--listen: expected a loopback address, or --token-file with it, got 0.0.0.0");
   AccessOptions options = make_options("0.0.0.0");
   options.token = kAccessToken;
@@ -232,7 +223,7 @@ TEST(AccessTest, ChecksAllowedOrigins) {
   for (const char* origin : {"null", "*", "", "app.foxglove.dev", "https://app.foxglove.dev/x",
                              "https://", "http://a b"}) {
     options.allowed_origins = {origin};
-    EXPECT_EQ(find_problem([&] { check(options); }),
+    EXPECT_EQ(test::find_error<config::ConfigError>([&] { check(options); }),
               "--allow-origin: expected SCHEME://HOST[:PORT], got '" + std::string(origin) + "'");
   }
 }
@@ -248,7 +239,7 @@ class TokenFileTest : public testing::Test {
     return file;
   }
   std::string find_token_problem(const std::string& file) {
-    return find_problem([&] { load_token(file); });
+    return test::find_error<config::ConfigError>([&] { load_token(file); });
   }
   test::TemporaryFolder folder_;
 };

@@ -3,7 +3,6 @@
 
 #include <functional>
 #include <future>
-#include <string>
 #include <thread>
 
 #include "tools/view/web/server.hpp"

@@ -6,6 +6,7 @@
 #include <fstream>
 
 #include "common/config/config_error.hpp"
+#include "tests/support/errors.hpp"
 #include "tests/support/waiting.hpp"
 #include "tests/tools/view/web/running_server.hpp"
 #include "tests/tools/view/web/sessions.hpp"
@@ -247,12 +248,7 @@ TEST(ServerLimitsTest, AConnectionBeyondTheLimitReplacesTheOldestThatMayOnlyLook
 // --- addresses -----------------------------------------------------------------------------------
 
 std::string find_problem(const ServerOptions& options) {
-  try {
-    Server server(options);
-  } catch (const config::ConfigError& error) {
-    return error.what();
-  }
-  return "";
+  return test::find_error<config::ConfigError>([&] { Server server(options); });
 }
 
 TEST(ServerAddressTest, SaysThatThePortIsTakenAndWhatToDo) {
