@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "control_client/laws/control_law.hpp"
 #include "tests/control_client/sample_scenarios.hpp"
 
 namespace sls::control {
