@@ -151,6 +151,8 @@ def lay_out(figure: Figure, paper: float | None = None, panels: Sequence[int] = 
     else:
         figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, top))
         figure.align_ylabels()
+        figure.get_layout_engine().execute(figure)  # once; each file of the figure would do it again
+        figure.set_layout_engine(None)
 
 
 def keep_panels(figure: Figure, numbers: Sequence[int]) -> None:
