@@ -204,7 +204,7 @@ class PackageTest(unittest.TestCase):
         verdict = run([BUILD / "bin/sls_verify", f"{SYSTEM}{WORK}/{recording}", ours])
         self.assertIn("equal", verdict)
         fly("sls", "verify", recording)
-        fly("sls", "plot", recording)
+        fly("sls", "plot", recording, "--panels", "path")
         fly("sls", "report", recording)
         self.assertTrue((Path(f"{SYSTEM}{WORK}") / recording / "report.html").is_file())
 
