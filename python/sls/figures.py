@@ -151,8 +151,6 @@ def lay_out(figure: Figure, paper: float | None = None, panels: Sequence[int] = 
     else:
         figure.get_layout_engine().set(rect=(0.0, 0.0, 1.0, top))
         figure.align_ylabels()
-        figure.get_layout_engine().execute(figure)  # once; each file of the figure would do it again
-        figure.set_layout_engine(None)
 
 
 def keep_panels(figure: Figure, numbers: Sequence[int]) -> None:
@@ -544,4 +542,7 @@ def make_figures(flights: Sequence[Trajectory], fleet: Sequence[Trajectory] = ()
 def save(figure: Figure, path: Path, dpi: int = 150, style: Mapping[str, Any] = STYLE) -> None:
     """Writes `figure` to `path`, in the format of the file's suffix."""
     with matplotlib.rc_context(style):
+        if layout := figure.get_layout_engine():  # once: the next file of this figure would do it again
+            layout.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(path, dpi=dpi, metadata=METADATA[path.suffix[1:]], facecolor="white")
