@@ -33,7 +33,6 @@ using namespace std::chrono_literals;
 
 constexpr const char* kIdentity = "controller";  // its keys are used on a secured domain
 constexpr auto kSignalInterval = 50ms;           // between runs of Python's signal handlers
-constexpr auto kPatience = 20s;  // after a stop signal, equal to that of the programs
 
 /// Ends a process that is still blocked after a stop signal, for example in a law that does not
 /// return. The programs do the same.
@@ -60,12 +59,14 @@ class PythonClient {
  public:
   PythonClient(const py::object& law, const config::Scenario& scenario, const std::string& name,
                std::int32_t strength, const std::string& vehicles, bool follow,
-               const std::string& qos_file, int domain, std::string log_level)
+               const std::string& qos_file, int domain, std::string log_level, double patience_s)
       : scenario_(scenario),
         vehicle_ids_(parse_vehicles(vehicles, scenario_.vehicles.size())),
         qos_file_(qos_file.empty() ? bus::default_qos_file() : std::filesystem::path(qos_file)),
         domain_(domain),
         log_level_(std::move(log_level)),
+        patience_(
+            std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(patience_s))),
         law_(law) {
     const std::string defect = control::describe_name_defect(name);
     if (!defect.empty()) throw config::ConfigError("name: " + defect);
@@ -95,7 +96,7 @@ class PythonClient {
         if (Clock::now() > give_up) end_process(*interruption);
       } else if (PyErr_CheckSignals() != 0) {
         interruption.emplace();
-        give_up = Clock::now() + kPatience;
+        give_up = Clock::now() + patience_;
         is_stopped_ = true;
       }
     }
@@ -152,6 +153,7 @@ class PythonClient {
   const std::filesystem::path qos_file_;
   const int domain_;
   const std::string log_level_;
+  const Clock::duration patience_;  // after a stop signal
   const py::object law_;
   std::shared_ptr<LawErrors> errors_;
   control::ClientOptions options_;
@@ -169,10 +171,10 @@ class PythonClient {
 void add_client(py::module_& module) {
   py::class_<PythonClient>(module, "Client", "A Python law over DDS: sls.Client is its face.")
       .def(py::init<const py::object&, const config::Scenario&, const std::string&, std::int32_t,
-                    const std::string&, bool, const std::string&, int, std::string>(),
+                    const std::string&, bool, const std::string&, int, std::string, double>(),
            py::arg("law"), py::arg("scenario"), py::arg("name"), py::arg("strength"),
            py::arg("vehicles"), py::arg("follow"), py::arg("qos"), py::arg("domain"),
-           py::arg("log_level"))
+           py::arg("log_level"), py::arg("patience_s"))
       .def("run", &PythonClient::run)
       .def("stop", &PythonClient::stop);
 }

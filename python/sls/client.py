@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from sls.flight import Law, LawWithMemory
 
 LOG_LEVELS = ("debug", "info", "warning", "error")
+PATIENCE_S = 20.0  # after a stop signal, equal to that of the programs
 
 
 def read_domain() -> int:
@@ -68,7 +69,8 @@ class Client:
         self._client = load_core().Client(
             law, to_scenario(scenario), name, to_whole("strength", strength, -2**31, 2**31 - 1),
             vehicles, bool(follow), "" if qos is None else os.fspath(qos),
-            to_whole("domain", read_domain() if domain is None else domain, 0, 232), log_level)
+            to_whole("domain", read_domain() if domain is None else domain, 0, 232), log_level,
+            PATIENCE_S)
 
     def run(self) -> None:
         """Joins the run and flies to its end; after a reset it also flies the next run.

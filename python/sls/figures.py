@@ -542,4 +542,7 @@ def make_figures(flights: Sequence[Trajectory], fleet: Sequence[Trajectory] = ()
 def save(figure: Figure, path: Path, dpi: int = 150, style: Mapping[str, Any] = STYLE) -> None:
     """Writes `figure` to `path`, in the format of the file's suffix."""
     with matplotlib.rc_context(style):
+        if layout := figure.get_layout_engine():  # once: the next file of this figure would do it again
+            layout.execute(figure)
+            figure.set_layout_engine(None)
         figure.savefig(path, dpi=dpi, metadata=METADATA[path.suffix[1:]], facecolor="white")

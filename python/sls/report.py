@@ -7,17 +7,18 @@ import tempfile
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
-from sls.figures import make_figures, save
 from sls.trajectory import Trajectory, find_spans
 from sls.metrics import StageMetrics, calc_errors, calc_stage_metrics
 from sls.recordings import Recording, describe_ids
 from sls.scene import MOST_BYTES, make_scene
 from sls.tables import format_error, list_error_cells, list_step_cells
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 CAPTIONS = {
     "fleet": "All vehicles: the paths of their loads from above, and how far each load is from its "
@@ -328,12 +329,13 @@ def make_fleet_section(fleet: Sequence[Trajectory]) -> str:
 
 
 def make_figure_list(flight: Trajectory, fleet: Sequence[Trajectory], marks: Sequence[tuple[float, str]] = ()) -> str:
+    from sls import figures  # half a second, and most pages have no figures
     parts = []
     with tempfile.TemporaryDirectory() as folder:
-        for name, figure in make_figures([flight], fleet).items():
+        for name, figure in figures.make_figures([flight], fleet).items():
             mark_times(figure, marks)
             file = Path(folder) / f"{name}.svg"
-            save(figure, file)
+            figures.save(figure, file)
             data = base64.b64encode(add_dark_colours(file.read_text()).encode()).decode()
             caption = escape(CAPTIONS[name])
             parts.append(f"<figure id=\"{name}\"><img alt=\"{caption}\" "
@@ -342,7 +344,7 @@ def make_figure_list(flight: Trajectory, fleet: Sequence[Trajectory], marks: Seq
     return "".join(parts) or f"<p>No data: the flight ended at step {flight.time_s[-1] / flight.period_s:.0f}.</p>"
 
 
-def mark_times(figure: Figure, marks: Sequence[tuple[float, str]]) -> None:
+def mark_times(figure: "Figure", marks: Sequence[tuple[float, str]]) -> None:
     """Draws a line at each of these times into the panels whose horizontal axis is time."""
     for axes in figure.axes:
         if marks and any(below.get_xlabel().startswith("time") for below in figure.axes

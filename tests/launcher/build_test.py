@@ -151,8 +151,8 @@ class BuildTest(CheckoutTest):
     def test_a_long_build_says_how_far_it_is_by_the_lines_of_its_files_once_a_tenth_is_done(self):
         launcher = (self.root / "sls").read_text()
         self.assertIn(" next=15\n", launcher)
-        (self.root / "sls").write_text(launcher.replace(" next=15\n", " next=6\n"))  # the first time after 6 s
-        self.write("compiler", '#!/bin/sh\ncase "$*" in *closed_loop*) sleep 8 ;; esac\nexec "$@"\n')
+        (self.root / "sls").write_text(launcher.replace(" next=15\n", " next=3\n"))  # the first time after 3 s
+        self.write("compiler", '#!/bin/sh\ncase "$*" in *closed_loop*) sleep 5 ;; esac\nexec "$@"\n')
         (self.root / "compiler").chmod(0o755)
         self.write("CMakeLists.txt", CMAKE + """add_executable(long long.c)
 set_target_properties(${programs} long PROPERTIES C_COMPILER_LAUNCHER ${CMAKE_SOURCE_DIR}/compiler)

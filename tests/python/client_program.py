@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 import sls
+import sls.client
 
 sys.path.append(str(Path(__file__).resolve().parents[2] / "examples/python"))
 from pid import Pid  # noqa: E402
@@ -32,6 +33,8 @@ LAWS = {"pid": Pid(MODEL), "broken": Broken(MODEL), "sleepy": Sleepy(MODEL),
 
 def main():
     scenario, domain, name, strength, law = sys.argv[1:]
+    if law == "sleepy":
+        sls.client.PATIENCE_S = 1.0
     sls.Client(LAWS[law], scenario, domain=int(domain), name=name, strength=int(strength)).run()
 
 

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 from statistics import NormalDist
 
 import numpy as np
-from scipy.stats import binom
-from scipy.stats import t as student
 
 LEVEL = 0.95
 
@@ -40,6 +38,7 @@ def calc_share_interval(is_counted: np.ndarray, draw: np.ndarray,
         return calc_wilson_interval(count, total, level)
     if draws == 1:
         return 0.0, 1.0
+    from scipy.stats import t as student  # half a second, which most campaigns do not need
     share = count / total
     variance = float(np.sum((np.bincount(places, is_counted) - share * runs) ** 2)) / total**2
     upper = (1.0 + level) / 2.0
@@ -77,6 +76,7 @@ class PairedDifference:
 
 def calc_sign_p(one: int, other: int) -> float:
     """p of formulas 5 and 6, if one sign occurs `one` times and the other `other` times; 1 if neither occurs."""
+    from scipy.stats import binom
     return float(min(1.0, 2.0 * binom.cdf(min(one, other), one + other, 0.5)))
 
 
@@ -113,6 +113,7 @@ def calc_medians(values: np.ndarray, group: np.ndarray) -> np.ndarray:
 
 def find_interval_rank(count: int, level: float = LEVEL) -> int:
     """k of formula 4; 0 if even the smallest and largest difference do not reach this level."""
+    from scipy.stats import binom
     tail = (1.0 - level) / 2.0
     # ppf gives the smallest j with P(B ≤ j) ≥ tail. It follows that P(B < j) = P(B ≤ j − 1) < tail.
     rank = int(binom.ppf(tail, count, 0.5))

@@ -15,7 +15,7 @@ import pytest
 from places import BUILD, ROOT
 
 import sls.check.flights
-import sls.report
+import sls.figures
 from sls.check.cli import main
 
 LAW = """
@@ -174,7 +174,7 @@ CLIENT = (f"command: [{sys.executable}, -BPm, sls.check.python_law, client, 'law
 ])
 def test_the_verdict_names_what_a_controller_did(check, impatient, monkeypatch, tmp_path, controller, expected):
     # Drawing takes seconds.
-    monkeypatch.setattr(sls.report, "save", lambda figure, path, *_, **__: path.write_text("<svg></svg>"))
+    monkeypatch.setattr(sls.figures, "save", lambda figure, path, *_, **__: path.write_text("<svg></svg>"))
     if "not ready within 4 s" in expected:
         (tmp_path / "mine.yaml").write_text(SCENARIO.replace("timeout_s: 60", "timeout_s: 4"))
     has_page = "licence" in controller or "crash" in controller  # without steps, and with figures

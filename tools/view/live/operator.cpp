@@ -20,7 +20,6 @@ namespace {
 using namespace std::chrono_literals;
 
 constexpr std::size_t kMostRequests = 8;
-constexpr double kTimeout = 5;  // s, to find a run and again for its reply
 
 }  // namespace
 
@@ -43,8 +42,12 @@ struct Operator::Impl {
     ctl::OperatorClient::Question question;
   };
 
-  Impl(bus::Node& bus_node, std::uint32_t vehicle, Feed::Post post_task, bool may)
-      : node(bus_node), vehicle_id(vehicle), post(std::move(post_task)), may_ask(may) {
+  Impl(bus::Node& bus_node, std::uint32_t vehicle, Feed::Post post_task, bool may, double timeout)
+      : node(bus_node),
+        vehicle_id(vehicle),
+        post(std::move(post_task)),
+        may_ask(may),
+        timeout_s(timeout) {
     if (may_ask) thread = std::thread([this] { work(); });
   }
 
@@ -94,7 +97,7 @@ struct Operator::Impl {
   void make_client() {
     ctl::ClientOptions options;
     options.vehicle_id = vehicle_id;
-    options.timeout_s = kTimeout;
+    options.timeout_s = timeout_s;
     client.emplace(node, options);
   }
 
@@ -114,6 +117,7 @@ struct Operator::Impl {
   const std::uint32_t vehicle_id;
   const Feed::Post post;
   const bool may_ask;
+  const double timeout_s;
   const std::shared_ptr<bool> is_alive = std::make_shared<bool>(true);  // server's thread
   std::size_t open_requests = 0;                                        // likewise
   app::Mailbox<Request> requests{kMostRequests + 1};
@@ -123,8 +127,9 @@ struct Operator::Impl {
   std::thread thread;                         // a reply may take as long as its steps
 };
 
-Operator::Operator(bus::Node& node, std::uint32_t vehicle_id, Feed::Post post, bool may_ask)
-    : impl_(std::make_unique<Impl>(node, vehicle_id, std::move(post), may_ask)) {}
+Operator::Operator(bus::Node& node, std::uint32_t vehicle_id, Feed::Post post, bool may_ask,
+                   double timeout_s)
+    : impl_(std::make_unique<Impl>(node, vehicle_id, std::move(post), may_ask, timeout_s)) {}
 Operator::Operator() = default;
 Operator::~Operator() = default;
 

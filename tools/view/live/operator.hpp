@@ -21,8 +21,10 @@ struct OperatorReply {
 
 class Operator {
  public:
-  /// `may_ask`: false if the keys of the secured domain are not an operator's.
-  Operator(bus::Node& node, std::uint32_t vehicle_id, Feed::Post post, bool may_ask);
+  /// `may_ask`: false if the keys of the secured domain are not an operator's. `timeout_s`: to find
+  /// a run, and again for its reply.
+  Operator(bus::Node& node, std::uint32_t vehicle_id, Feed::Post post, bool may_ask,
+           double timeout_s = 5.0);
   virtual ~Operator();
 
   virtual bool may_ask() const;

@@ -27,8 +27,8 @@ CHUNK_S = 60.0         # work in a chunk, s
 TASK_S = 60.0          # least work in a task, s, because Slurm starts only a few tasks per second
 MOST_ROUNDS = 3        # submissions of a chunk
 LOST_AFTER_S = 60.0    # a controller without an answer for this time is lost
-FIRST_POLL_S = 0.5
-LAST_POLL_S = 15.0     # long, because the controller serves the whole site
+EVERY_S = 0.5          # between two looks at the folder
+LAST_POLL_S = 15.0     # between two questions to the controller: long, because it serves the whole site
 COMMAND_LIMIT_S = 60.0
 WORKER_ERROR = "campaign-worker: error:"
 START = "`sinfo` must show the nodes of a running cluster; SLURM_CONF names its slurm.conf"
@@ -270,7 +270,8 @@ def wait(folder: CampaignFolder, missing: Sequence[int], progress: Progress) -> 
     missing = set(missing)
     # A damaged chunk also has a file, until a task replaces it.
     damaged = missing & count_files(folder)
-    seen, poll_s, answered = set(damaged), FIRST_POLL_S, time.monotonic()
+    seen, poll_s, answered = set(damaged), EVERY_S, time.monotonic()
+    asked = answered - poll_s
     while True:
         new = (count_files(folder) & missing) - seen
         for number in new:
@@ -279,17 +280,18 @@ def wait(folder: CampaignFolder, missing: Sequence[int], progress: Progress) -> 
         progress.draw()
         if seen == missing and not damaged:
             return
-        try:
-            states = list_states(name_job(folder))
-            answered = time.monotonic()
-            if all(is_held(state) for state in states):
-                cancel(folder)
-                return
-        except ControllerLost as error:
-            if time.monotonic() - answered > LOST_AFTER_S:
-                raise EngineError(describe_loss(folder, error)) from None
-        time.sleep(poll_s)
-        poll_s = min(poll_s * 1.2, LAST_POLL_S)
+        if time.monotonic() >= asked + poll_s:
+            poll_s, asked = min(poll_s * 1.2, LAST_POLL_S), time.monotonic()
+            try:
+                states = list_states(name_job(folder))
+                answered = time.monotonic()
+                if all(is_held(state) for state in states):
+                    cancel(folder)
+                    return
+            except ControllerLost as error:
+                if time.monotonic() - answered > LOST_AFTER_S:
+                    raise EngineError(describe_loss(folder, error)) from None
+        time.sleep(EVERY_S)
 
 
 def is_held(state: str) -> bool:

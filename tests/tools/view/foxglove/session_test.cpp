@@ -54,13 +54,15 @@ class FoxgloveSessionTest : public ::testing::Test {
     session->receive(MessageKind::kBinary, test::to_service_call(service, 77, encoding, data));
   }
   /// The id of the channel of `topic`; fails the test if it is not advertised.
-  std::uint32_t find_channel(const std::string& topic) const {
+  /// The channel of each topic.
+  std::map<std::string, std::uint32_t> list_channels() const {
+    std::map<std::string, std::uint32_t> channels;
     for (const Json& advertise : connection.find("advertise"))
       for (const Json& channel : advertise.at("channels"))
-        if (channel.at("topic") == topic) return channel.at("id");
-    ADD_FAILURE() << "no channel " << topic;
-    return 0;
+        channels.emplace(channel.at("topic"), channel.at("id"));
+    return channels;
   }
+  std::uint32_t find_channel(const std::string& topic) const { return list_channels().at(topic); }
   void subscribe(std::uint32_t id, std::uint32_t channel) {
     send_json(Json{{"op", "subscribe"}, {"subscriptions", {{{"id", id}, {"channelId", channel}}}}});
   }
@@ -194,8 +196,9 @@ TEST_F(FoxgloveSessionTest, EveryVehicleOfAFleetOf100IsMirrored) {
   std::iota(ids.begin(), ids.end(), 0u);
   flight->begin_run(kRun, ids);
   connect();
+  const auto channels = list_channels();
   for (const std::uint32_t id : ids)
-    subscribe(id, find_channel("/sls/vehicle_" + std::to_string(id) + "/load/pose"));
+    subscribe(id, channels.at("/sls/vehicle_" + std::to_string(id) + "/load/pose"));
   for (std::uint64_t step = 0; step < 100; ++step, now += 10ms)
     for (auto first = ids.begin(); first != ids.end(); first += 20)  // a step has several batches
       flight->publish(TopicId::kRecord, make_batch(step, 1, {first, first + 20}));
@@ -208,10 +211,7 @@ TEST_F(FoxgloveSessionTest, EveryVehicleOfAFleetOf100IsMirrored) {
 TEST_F(FoxgloveSessionTest, ANewRunIsANewSessionAndVanishedVehiclesAreUnadvertised) {
   flight->begin_run(kRun, {0, 1});
   connect();
-  std::map<std::string, std::uint32_t> before;
-  const Json advertised = connection.find("advertise").at(0);
-  for (const Json& channel : advertised.at("channels"))
-    before[channel.at("topic")] = channel.at("id");
+  const auto before = list_channels();
   std::uint32_t id = 0;
   for (const auto& [topic, channel] : before) subscribe(id++, channel);
   EXPECT_EQ(errors(), std::vector<std::string>());

@@ -36,8 +36,8 @@ struct Page {
 
 class PageProtocolTest : public testing::Test {
  protected:
-  explicit PageProtocolTest(bool may_ask = true)
-      : requests(node, 0, thread.post(), may_ask),
+  explicit PageProtocolTest(bool may_ask = true, double timeout_s = 5.0)
+      : requests(node, 0, thread.post(), may_ask, timeout_s),
         protocol(make_page_protocol(feed, requests, {domain.number(), 0, true})) {}
 
   bool wait_until(const std::function<bool()>& is_met) { return thread.wait_until(is_met); }
@@ -66,6 +66,11 @@ class PageProtocolTest : public testing::Test {
 class PageOfAViewerTest : public PageProtocolTest {
  protected:
   PageOfAViewerTest() : PageProtocolTest(false) {}
+};
+
+class PageWithoutServerTest : public PageProtocolTest {
+ protected:
+  PageWithoutServerTest() : PageProtocolTest(true, 0.2) {}
 };
 
 // --- messages to a page --------------------------------------------------------------------------
@@ -274,7 +279,7 @@ TEST_F(PageProtocolTest, AStopGoesOutWhileAStepRequestIsOpen) {
   EXPECT_EQ(page.connection.find("reply").at(1).at("id"), 1);
 }
 
-TEST_F(PageProtocolTest, WithoutAServerARequestIsRefusedInWords) {
+TEST_F(PageWithoutServerTest, ARequestIsRefusedInWords) {
   Page page(protocol);
   page.say(R"({"op":"control","id":1,"action":"pause"})");
   ASSERT_TRUE(wait_until([&] { return page.count("reply") == 1; }));
@@ -283,7 +288,7 @@ TEST_F(PageProtocolTest, WithoutAServerARequestIsRefusedInWords) {
             std::string::npos);
 }
 
-TEST_F(PageProtocolTest, OnlySoManyRequestsWait) {
+TEST_F(PageWithoutServerTest, OnlySoManyRequestsWait) {
   Page page(protocol);
   for (int i = 0; i < 20; ++i) page.say(R"({"op":"control","id":1,"action":"pause"})");
   ASSERT_TRUE(wait_until([&] { return page.count("reply") >= 12; }));

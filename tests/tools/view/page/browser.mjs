@@ -32,7 +32,7 @@ export async function startBrowser({ flags = [] } = {}) {
 }
 
 /** A tab that shares nothing with the others; `errors` and `requests` grow. The fragment of an address is never sent. */
-export async function open(browser, { width = 1366, height = 768, scheme = "dark", touch = false, motion = "no-preference" } = {}) {
+export async function open(browser, { width = 960, height = 600, scheme = "dark", touch = false, motion = "no-preference" } = {}) {
   const context = await browser.createBrowserContext();
   const page = await context.newPage();
   await page.setViewport({ width, height, hasTouch: touch, isMobile: touch, deviceScaleFactor: 1 });
