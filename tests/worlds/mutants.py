@@ -125,9 +125,10 @@ def put_in(places, numbers):
         for order, (offset, word, *length) in enumerate(places.found[begin, end, _]):
             # At one offset the ends of inner places come first, then the beginnings of outer ones.
             is_end = offset == end and order > 0
-            inserts.append((offset, not is_end, (end - begin) * (1 if is_end else -1), word.format(id_), *length))
+            sign = 1 if is_end else -1
+            inserts.append((offset, not is_end, (end - begin) * sign, -sign * len(inserts), word.format(id_), *length))
     text, last = b"", 0
-    for offset, _, _, word, *length in sorted(inserts, key=lambda insert: insert[:3]):
+    for offset, _, _, _, word, *length in sorted(inserts, key=lambda insert: insert[:4]):
         text += places.text[last:offset] + word.encode()
         last = max(last, offset + sum(length))
     return text + places.text[last:]
