@@ -29,13 +29,15 @@ void Outbox::put(Item item) {
 }
 
 void Outbox::write_waiting() {
-  std::deque<Item> items;
-  {
-    const std::lock_guard lock(mutex_);
-    items.swap(waiting_);
-    is_waiting_ = false;
+  std::unique_lock lock(mutex_);
+  while (!waiting_.empty()) {
+    const Item item = std::move(waiting_.front());
+    waiting_.pop_front();
+    is_waiting_ = !waiting_.empty();  // also if this item cannot be written
+    lock.unlock();
+    std::visit([this](const auto& content) { write(content); }, item);
+    lock.lock();
   }
-  for (const Item& item : items) std::visit([this](const auto& content) { write(content); }, item);
 }
 
 void Outbox::write(const sync::Line& line) { app::log(line); }

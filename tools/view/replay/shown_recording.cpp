@@ -49,25 +49,39 @@ void ShownRecording::ask(std::uint64_t run_id, bool is_over, Done done) {
 
 /// Answers all that wait, by one reading that begins after they have asked.
 void ShownRecording::read_next() {
-  thread_ =
-      std::thread([this, run_id = run_id_, is_over = is_over_, all = std::exchange(waiting_, {})] {
-        std::string bytes;
-        bool is_there = true;
-        try {
-          bytes = read(run_id, is_over);
-        } catch (const std::exception& error) {  // must not leave the thread; the pages show it
-          bytes = error.what();
-          is_there = false;
-        }
-        post_([this, is_alive = is_alive_, all, is_there,
-               answer = std::make_shared<const std::string>(std::move(bytes))] {
-          if (!*is_alive) return;
-          thread_.join();
-          newest_ = answer;
-          for (const Done& done : all) done(is_there, answer);
-          if (!waiting_.empty()) read_next();
-        });
-      });
+  const auto all = std::exchange(waiting_, {});
+  const auto answer_all = [is_alive = is_alive_, all](
+                              bool is_there, const std::shared_ptr<const std::string>& answer) {
+    for (const Done& done : all)
+      if (*is_alive) done(is_there, answer);
+  };
+  const auto work = [this, answer_all, is_alive = is_alive_, run_id = run_id_, is_over = is_over_] {
+    std::string bytes;
+    bool is_there = true;
+    try {
+      bytes = read(run_id, is_over);
+    } catch (const std::exception& error) {  // must not leave the thread; the pages show it
+      bytes = error.what();
+      is_there = false;
+    }
+    post_([this, is_alive, answer_all, is_there,
+           answer = std::make_shared<const std::string>(std::move(bytes))] {
+      if (!*is_alive) return;
+      thread_.join();
+      newest_ = answer;
+      answer_all(is_there, answer);
+      if (!waiting_.empty()) read_next();
+    });
+  };
+  try {
+    thread_ = std::thread(work);
+  } catch (const std::system_error& error) {  // a limit of threads
+    const std::string text =
+        fmt::format("expected a thread to read it, got none: {}", error.what());
+    post_([answer_all, answer = std::make_shared<const std::string>(text)] {
+      answer_all(false, answer);
+    });
+  }
 }
 
 std::string ShownRecording::read(std::uint64_t run_id, bool is_over) const {
