@@ -2,7 +2,6 @@
 
 #include <spdlog/fmt/fmt.h>
 
-#include "common/bus/topics.hpp"
 #include "recorder/rows.hpp"
 
 namespace sls::record {
@@ -11,9 +10,9 @@ std::string describe(const MissingSamples& missing) {
   std::uint64_t steps = missing.further_samples;
   for (const MissingSteps& gap : missing.listed) steps += gap.to - gap.from + 1;
   const MissingSteps& first = missing.listed.front();
-  const char* unit = first.topic == StatusRow::kTopic                ? "sample"
-                     : first.topic == bus::Topic<RecordBatch>::kName ? "batch"
-                                                                     : "step";
+  const char* unit = first.topic == StatusRow::kTopic ? "sample"
+                     : first.topic == kBatchTopic     ? "batch"
+                                                      : "step";
   return fmt::format("{} samples missing, first {} {} {} of vehicle {}", steps, first.topic, unit,
                      first.from, first.vehicle_id);
 }

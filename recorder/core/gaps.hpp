@@ -9,8 +9,11 @@
 
 namespace sls::record {
 
+/// The topic of missing batches of late answers, which have no file of their own.
+inline constexpr const char* kBatchTopic = "sls/record";
+
 /// Consecutive steps of one topic that are not in the recording. For sls/status, from and to are
-/// values of sample_index, for sls/record of batch_index.
+/// values of sample_index, for kBatchTopic of batch_index.
 struct MissingSteps {
   std::uint32_t vehicle_id = 0;
   std::string topic;

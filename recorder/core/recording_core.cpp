@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "common/bus/names.hpp"
-#include "common/bus/topics.hpp"
 
 namespace sls::record {
 
@@ -153,7 +152,7 @@ Claims RecordingCore::on_end(const Interruption& interruption, std::uint64_t ref
   note_missing_end();
   if (is_finished() && gaps_.missing().empty())  // no step is missing, so late answers are
     for (const MissingSteps& batches : stream_.missing_batches().listed)
-      gaps_.add(batches.vehicle_id, bus::Topic<RecordBatch>::kName, batches.from, batches.to);
+      gaps_.add(batches.vehicle_id, kBatchTopic, batches.from, batches.to);
   if (!interruption_.empty()) outputs_.add_event("recorder: " + interruption_);
   const MissingSamples& missing = gaps_.missing();
   if (!missing.empty()) outputs_.add_event("recorder: " + describe(missing));

@@ -7,7 +7,6 @@
 #include <utility>
 
 #include "common/bus/convert.hpp"
-#include "common/bus/topics.hpp"
 #include "common/sync/servers.hpp"
 
 namespace sls::record {
@@ -71,8 +70,7 @@ void Stream::skip_missing_batches() {
 }
 
 void Stream::note_missing_batches(std::uint64_t last) {
-  missing_batches_.add(next_steps_.begin()->first, bus::Topic<RecordBatch>::kName, *next_batch_,
-                       last);
+  missing_batches_.add(next_steps_.begin()->first, kBatchTopic, *next_batch_, last);
 }
 
 void Stream::on_time(sync::Time now) {

@@ -215,7 +215,9 @@ def main():
             flags = [word for word in re.findall(r"(?:-isystem |-[ID])\S+", command["command"])]
             arguments = [part.replace('\\"', '"') for flag in flags for part in flag.split()]
             find_places(cindex, Path(command["file"]), ["-std=c++17", *arguments], by_path)
-    whole = [(file, key) for file, places in all_places.items() for key in sorted(places.found)]
+    # Of places of equal extent a comparison is the innermost, because its operator becomes a comma.
+    whole = [(file, key) for file, places in all_places.items()
+             for key in sorted(places.found, key=lambda key: (*key[:2], key[2] in SWAPS, key[2]))]
 
     def describe(file, key):
         places = all_places[file]

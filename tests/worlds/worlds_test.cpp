@@ -14,7 +14,7 @@
 namespace sls::worlds {
 namespace {
 
-// They find 102 of the 108 mutants of mutants.py that 20,000 find; `./sls worlds --seeds 0-99999` before a release.
+// 20,000 find few defects more (docs/worlds.md); `./sls worlds --seeds 0-99999` before a release.
 constexpr std::uint64_t kWorlds = 3'000;
 
 class WorldsTest : public testing::Test {
@@ -50,7 +50,7 @@ TEST_F(WorldsTest, EveryPropertyHoldsInEveryWorld) {
   EXPECT_GT(result.finished, kWorlds * 7 / 10);
   EXPECT_GT(result.complete, kWorlds * 7 / 10);
   EXPECT_EQ(result.faults.size(), 13u);
-  for (const auto& [kind, count] : result.faults) EXPECT_GT(count, kWorlds / 10) << kind;
+  for (const auto& [kind, count] : result.faults) EXPECT_GT(count, kWorlds / 12) << kind;
 }
 
 TEST_F(WorldsTest, SeedsThatFailedOnceHold) {

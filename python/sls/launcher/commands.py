@@ -259,7 +259,7 @@ def reference(words: list[str]) -> NoReturn:
 
 def mutants(words: list[str]) -> NoReturn:
     if not is_help_asked(words):
-        call_script("@setup", "test_packages", "mutants_packages")
+        call_script("@setup", "test_packages")
     replace_by(PYTHON, "-B", ROOT / "tests/worlds/mutants.py", *words)
 
 

@@ -50,13 +50,19 @@ export async function open(browser, { width = 960, height = 600, scheme = "dark"
   return { page, errors, requests, close: () => context.close() };
 }
 
-/** Waits until `check` returns a true value. @throws Error after `limit` ms, with the last value. */
+/** Waits until `check` returns a true value; an element that is not there is none.
+ *  @throws Error after `limit` ms, with the last value. */
 export async function waitFor(what, check, limit = 60_000) {
   const end = performance.now() + limit;
   let last;
   for (;;) {
-    last = await check();
-    if (last) return last;
+    try {
+      last = await check();
+      if (last) return last;
+    } catch (error) {
+      if (!/failed to find element/.test(error.message)) throw error;
+      last = error.message; // it may still come
+    }
     if (performance.now() > end) throw new Error(`${what}: not within ${limit} ms; last: ${JSON.stringify(last)}`);
     await new Promise((resolve) => setTimeout(resolve, 50));
   }
