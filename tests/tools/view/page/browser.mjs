@@ -13,7 +13,7 @@ export const kLean = ["--disable-gpu-compositing", "--in-process-gpu", "--disabl
 /** A browser without a tab. */
 export async function startBrowser({ flags = [] } = {}) {
   const folder = mkdtempSync(join(tmpdir(), "sls-view-chromium-"));
-  const browser = await puppeteer.launch({
+  const launch = () => puppeteer.launch({
     executablePath: kChromium,
     headless: true,
     userDataDir: folder,
@@ -21,6 +21,11 @@ export async function startBrowser({ flags = [] } = {}) {
     args: ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
            "--disable-background-networking", "--disable-component-update", "--disable-sync", "--disable-dev-shm-usage",
            ...flags],
+  });
+  // Chromium itself crashed once within 0.2 s of its start, and in none of 30 others: it may try twice.
+  const browser = await launch().catch((error) => {
+    console.error(error.message);
+    return launch();
   });
   return {
     browser,
