@@ -166,8 +166,8 @@ def build(folder, tree, all_places, numbers):
         code, said = run("ninja", "-k", "0", "-C", folder / "build", *targets)
         if code == 0:
             return refused
-        lines = {(str(Path(tree, file)), int(line)) for file, line in
-                 re.findall(rf"^(?:{tree}/)?([^\s:]+):(\d+):\d+: (?:error|note|  required)", said, re.MULTILINE)}
+        lines = {(os.path.normpath(folder / "build" / file), int(line)) for file, line in
+                 re.findall(r"^([^\s:]+):(\d+):\d+: +(?:error|required)", said, re.MULTILINE)}
         bad = {id_ for id_, (file, key) in numbers.items() if id_ not in refused and
                any((str(tree / file), all_places[file].text[:at].count(b"\n") + 1) in lines for at in key[:2])}
         if not bad:
@@ -201,7 +201,8 @@ def main():
     copy_tree(tree)
     (folder / "switch.hpp").write_text(make_switch())
     subprocess.run(["cmake", "-S", tree, "-B", folder / "build", "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
-                    "-DCMAKE_UNITY_BUILD=OFF", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", "-DSLS_BUILD_PROGRAMS=OFF",
+                    "-DCMAKE_UNITY_BUILD=OFF", "-DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON",
+                    "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", "-DSLS_BUILD_PROGRAMS=OFF",
                     f"-DCMAKE_CXX_FLAGS=-include {folder / 'switch.hpp'}", "-DCMAKE_CXX_FLAGS_RELEASE=-O1"],
                    check=True, stdout=subprocess.DEVNULL)
     run("ninja", "-C", folder / "build", "sls_idl")
