@@ -179,7 +179,8 @@ def judge(folder, id_, seeds):
     """What found the defect: (scripts, worlds)."""
     by_scripts = [name for name in SCRIPTS
                   if run(folder / "build/tests" / name, "--gtest_fail_fast", limit_s=60, id_=id_)[0] != 0]
-    code, said = run(folder / "build/bin/sls_worlds", "--jobs", "1", "--seeds", f"0-{seeds - 1}", "--most", "1", id_=id_)
+    code, said = run(folder / "build/bin/sls_worlds", "--jobs", "1", "--seeds", f"0-{seeds - 1}", "--most", "1",
+                     limit_s=600, id_=id_)
     found = re.search(r"^seed (\d+):\n  (\S+):", said, re.MULTILINE)
     by_worlds = "no" if code == 0 else f"{found[2]}, seed {found[1]}" if found else f"exit code {code}"
     return ", ".join(by_scripts) or "no", by_worlds
