@@ -39,8 +39,8 @@ def make_switch():
 class Places:
     """The defects of one file: where, by which rule, and what is inserted."""
 
-    def __init__(self, index, text):
-        self.index, self.text, self.found = index, text, {}
+    def __init__(self, text):
+        self.text, self.found = text, {}
 
     def add(self, rule, begin, end, inserts):
         """`inserts`: (offset, text with {} for the id), outer ones first."""
@@ -111,7 +111,7 @@ def find_places(clang, file, arguments, places_of):
 
     def note_statement(place, cursor, begin, end):
         is_assignment = cursor.kind in (kinds.BINARY_OPERATOR, kinds.COMPOUND_ASSIGNMENT_OPERATOR, kinds.UNARY_OPERATOR)
-        if cursor.kind in (kinds.CALL_EXPR,) or is_assignment:
+        if cursor.kind == kinds.CALL_EXPR or is_assignment:
             rule = "no assignment" if is_assignment else "no call"
             place.add(rule, begin, end, [(begin, "if (!::sls_mutants::on({})) ")])
 
@@ -121,8 +121,8 @@ def find_places(clang, file, arguments, places_of):
 def put_in(places, numbers):
     """The text with the defects of `numbers`: {key of a place: id}."""
     inserts = []
-    for (begin, end, _), id_ in numbers.items():
-        for order, (offset, word, *length) in enumerate(places.found[begin, end, _]):
+    for (begin, end, rule), id_ in numbers.items():
+        for order, (offset, word, *length) in enumerate(places.found[begin, end, rule]):
             # At one offset the ends of inner places come first, then the beginnings of outer ones.
             is_end = offset == end and order > 0
             sign = 1 if is_end else -1
@@ -210,7 +210,7 @@ def main():
     all_places = {}
     for core in CORES:
         for file in sorted((ROOT / core).rglob("*.?pp")):
-            all_places[str(file.relative_to(ROOT))] = Places(len(all_places), file.read_bytes())
+            all_places[str(file.relative_to(ROOT))] = Places(file.read_bytes())
     by_path = {str((tree / file).resolve()): places for file, places in all_places.items()}
     for command in json.loads((folder / "build/compile_commands.json").read_text()):
         if command["file"] in by_path:

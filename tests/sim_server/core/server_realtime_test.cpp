@@ -23,6 +23,16 @@ class ServerRealtimeTest : public testing::Test {
     }
   }
 
+  /// Flies up to step 250, and answers it when it is over: that it ends the mission.
+  ServerRig::Answer end_late() {
+    fly_to(249);
+    rig_.wait_until(1004);
+    ServerRig::Answer last{250};
+    last.is_last = true;
+    rig_.answer("pilot", last);
+    return last;
+  }
+
   ServerRig rig_{ServerRig::make_realtime_scenario()};
 };
 
@@ -196,11 +206,7 @@ TEST_F(ServerRealtimeTest, ALateEndWaitsForTheAnswerToTheLastState) {
 
 TEST_F(ServerRealtimeTest, ALateEndWithoutALastAnswerFailsAfterASecond) {
   rig_.lifespan = 100ms;
-  fly_to(249);
-  rig_.wait_until(1004);
-  ServerRig::Answer last{250};
-  last.is_last = true;
-  rig_.answer("pilot", last);
+  end_late();
   rig_.wait_until(2007);
   EXPECT_EQ(rig_.phase(), Phase::kAwaitingAnswers);
   EXPECT_TRUE(rig_.is_lifespan_ignored()) << "its clock may be wrong";
@@ -210,11 +216,7 @@ TEST_F(ServerRealtimeTest, ALateEndWithoutALastAnswerFailsAfterASecond) {
 }
 
 TEST_F(ServerRealtimeTest, AWithdrawnLateEndLeavesTheNextOneItsWholeTime) {
-  fly_to(249);
-  rig_.wait_until(1004);
-  ServerRig::Answer last{250};
-  last.is_last = true;
-  rig_.answer("pilot", last);
+  ServerRig::Answer last = end_late();
   rig_.wait_until(1900);
   rig_.answer("pilot", 251);  // the mission goes on
   rig_.wait(5);
