@@ -15,15 +15,13 @@ namespace {
 
 using namespace std::chrono_literals;
 
-/// Drift of clocks, and the wake-ups of a program that has its processor.
-constexpr Instant kSlack = 20ms;
 /// A server looks at its participants ten times a second.
 constexpr Instant kKnownAfter = 500ms;
 /// It looks for a stop signal every 20 ms, between two requests.
 constexpr Instant kObeysWithin = 500ms;
 constexpr Instant kGivesUpWithin = 2s;
 /// A server may presume a client dead that was silent for this long, until its next look.
-constexpr Instant kForgottenAfter = sync::kPresumedDeadAfter - kSlack;
+constexpr Instant kForgottenAfter = sync::kPresumedDeadAfter - FlightWatch::kSlack;
 
 /// False if a number that the server looks at is not finite.
 bool is_finite(const ControlCommand& command) {
@@ -35,6 +33,18 @@ bool is_finite(const ControlCommand& command) {
 }
 
 }  // namespace
+
+FlightWatch::FlightWatch(const config::Scenario& scenario, std::uint64_t run_id,
+                         std::vector<std::uint32_t> vehicle_ids, const Program& server,
+                         std::function<void(std::string)> find)
+    : server_(server),
+      sync_(scenario.sync),
+      limits_(sim::make_answer_limits(scenario)),
+      scenario_sha256_(scenario.sha256),
+      run_id_(run_id),
+      vehicle_ids_(std::move(vehicle_ids)),
+      began_(server.awake()),
+      find_(std::move(find)) {}
 
 void FlightWatch::Client::hear(Instant now) {
   if (now - heard >= kForgottenAfter) back = now;
@@ -57,6 +67,14 @@ bool FlightWatch::is_sound(const ControlCommand& command, std::uint64_t step) co
 
 void FlightWatch::on_member(const Participant& message, const bus::PeerId& peer,
                             const Process& sender, Instant now) {
+  if (message.role() == ParticipantRole::ROLE_RECORDER) {
+    Recorder& recorder = recorders_[sender.name()];
+    const bool is_ready = message.ready() && message.run_id() == run_id_;
+    if (!is_ready || recorder.ready == Instant(0)) recorder.ready = is_ready ? now : Instant(0);
+    recorder.process = &sender;
+    recorder.peer = peer;
+    recorder.heard = server_.awake();
+  }
   if (message.role() != ParticipantRole::ROLE_CONTROLLER) return;
   Client& client = clients_[sender.name()];
   const bool is_ready = message.ready() && message.run_id() == run_id_ &&
@@ -71,6 +89,7 @@ void FlightWatch::on_member(const Participant& message, const bus::PeerId& peer,
   has_libraries_ = has_libraries_ || message.library_sha256().size() > 0;
   client.vehicle_ids.assign(message.vehicle_ids().begin(), message.vehicle_ids().end());
   client.hear(now);
+  client.heard_awake = server_.awake();
   if (is_ready) rightful_.insert(sender.name());
 }
 
@@ -78,6 +97,9 @@ void FlightWatch::on_answers(const Commands& sample, const Process& sender, Inst
   Client& client = clients_[sender.name()];
   client.process = &sender;
   client.hear(now);
+  client.heard_awake = server_.awake();
+  for (const ControlCommand& command : sample.vehicles())
+    client.has_erred = client.has_erred || !is_sound(command, sample.step());
   if (sample.run_id() != run_id_ || !has_begun_ || sample.step() != step_) return;
   if (client.answered_step != step_) {
     client.answers.clear();
@@ -92,30 +114,37 @@ void FlightWatch::on_answers(const Commands& sample, const Process& sender, Inst
 void FlightWatch::on_request(ControlAction action, Instant now) {
   is_disturbed_ = true;
   for (auto& [vehicle, lacking] : lacking_) lacking.since = now;  // a pause is no absence
-  if (action == ControlAction::ACTION_STOP && !stop_requested_) stop_requested_ = now;
+  if (action == ControlAction::ACTION_STOP && !stop_requested_)
+    stop_requested_ = server_.awake();
   if (action != ControlAction::ACTION_PAUSE)
     paused_.reset();
   else if (!paused_)
-    paused_ = now;
+    paused_ = server_.awake();
 }
 
 // --- the server does -----------------------------------------------------------------------------
 
 void FlightWatch::on_published(std::uint64_t step, Instant now) {
   const auto disobeys = [&](const std::optional<Instant>& since, const char* what) {
-    if (since && !is_disturbed() && now - *since > kObeysWithin)
+    if (since && !is_disturbed() && server_.awake() - *since > kObeysWithin)
       find_(fmt::format("obeys: step {} leaves {:.3f} s after {}", step,
-                        sync::to_seconds(now - *since), what));
+                        sync::to_seconds(server_.awake() - *since), what));
   };
   disobeys(interrupted_, "SIGINT");
   disobeys(stop_requested_, "an operator's stop");
   disobeys(paused_, "an operator's pause");
+  // The wait for recorders between two steps is no absence of a controller.
+  if (has_begun_ && is_lockstep())
+    for (auto& [vehicle, lacking] : lacking_) lacking.since += now - recorded_;
   has_begun_ = true;
   step_ = step;
   published_ = now;
+  published_awake_ = server_.awake();
   sent_ = now;
   is_disturbed_ = false;
 }
+
+void FlightWatch::on_interrupted() { interrupted_ = server_.awake(); }
 
 /// The library of the first client decides who may fly, and the memory of a server.
 bool FlightWatch::is_unclear() const {
@@ -139,6 +168,7 @@ void FlightWatch::on_resent(Instant now) {
 void FlightWatch::on_recorded(const std::vector<model::StepRecord>& records, Instant now) {
   check_gap(now);
   sent_.reset();
+  recorded_ = now;
   check_take_over(records, now);
   for (const model::StepRecord& record : records) {
     check_policy(record, now);
@@ -245,6 +275,7 @@ std::vector<std::pair<std::string, const FlightWatch::Client&>> FlightWatch::lis
 
 void FlightWatch::check_policy(const model::StepRecord& record, Instant now) {
   const auto policy = sync_.wait.controller.policy;
+  if (record.kind == model::AnswerKind::kNone) return;  // the run has ended
   const bool is_held = record.kind == model::AnswerKind::kHeld;
   if (!is_held && record.kind != model::AnswerKind::kFailSafe) {
     lacking_.erase(record.vehicle_id);
@@ -253,7 +284,7 @@ void FlightWatch::check_policy(const model::StepRecord& record, Instant now) {
   if (is_lockstep() &&
       (policy == config::ControllerPolicy::kWait || policy == config::ControllerPolicy::kStop))
     find_(fmt::format("policy: step {} is flown without an answer", record.step));
-  Lacking& lacking = lacking_.try_emplace(record.vehicle_id, Lacking{now, 0}).first->second;
+  Lacking& lacking = lacking_.try_emplace(record.vehicle_id, Lacking{now, published_awake_, 0}).first->second;
   lacking.held += is_held;
   const double held_s =
       static_cast<double>(lacking.held) * static_cast<double>(sync_.period_ns) * 1e-9;

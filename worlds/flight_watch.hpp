@@ -2,6 +2,7 @@
 /// who flies, when another client takes over, what is sent again, the policies, the operator.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <map>
@@ -25,15 +26,13 @@ class Program;
 
 class FlightWatch {
  public:
+  /// Drift of clocks, and the wake-ups of a program that has its processor.
+  static constexpr Instant kSlack = std::chrono::milliseconds(20);
+
   /// Of run `run_id` of `server`. `find`: called with each broken rule.
-  FlightWatch(const config::Scenario& scenario, std::uint64_t run_id, const Program& server,
-              std::function<void(std::string)> find)
-      : server_(server),
-        sync_(scenario.sync),
-        limits_(sim::make_answer_limits(scenario)),
-        scenario_sha256_(scenario.sha256),
-        run_id_(run_id),
-        find_(std::move(find)) {}
+  FlightWatch(const config::Scenario& scenario, std::uint64_t run_id,
+              std::vector<std::uint32_t> vehicle_ids, const Program& server,
+              std::function<void(std::string)> find);
 
   // --- arrives at the server ---
 
@@ -51,7 +50,10 @@ class FlightWatch {
   void on_late() { lacking_.clear(); }
   /// A status of a flight that runs, not paused.
   void on_running(Instant now);
-  void on_interrupted(Instant now) { interrupted_ = now; }
+  /// The run fails with `reason`. False if it is none of those that participants cause.
+  bool on_failed(const std::string& reason, Instant now);
+  const config::Sync& sync() const { return sync_; }
+  void on_interrupted();
   /// Its process was stopped or continued, or became slower or faster: it may be late with all.
   void on_disturbed() { is_disturbed_ = true; }
 
@@ -64,10 +66,12 @@ class FlightWatch {
     Instant ready{0};  // its first announcement that says so
     Instant left{0};   // its first one after that which does not
     Instant heard{0};  // its last sample
+    Instant heard_awake{0};  // the same in awake time of the server
     Instant back{0};   // the first one after a long silence
     std::uint64_t answered_step = 0;
     std::map<std::uint32_t, Instant> answers;  // the first ones to that step, by vehicle
     std::map<std::uint32_t, Instant> refused;  // the first defective ones to it
+    bool has_erred = false;                    // one of its answers was defective
 
     void hear(Instant now);
     bool has_answered(std::uint32_t vehicle, std::uint64_t step) const {
@@ -77,9 +81,16 @@ class FlightWatch {
       return answered_step == step && refused.count(vehicle) > 0;
     }
   };
+  struct Recorder {
+    const Process* process = nullptr;
+    bus::PeerId peer;
+    Instant ready{0};  // its first announcement that says so; 0: it does not
+    Instant heard{0};  // awake time of the server
+  };
   /// Steps in a row that a vehicle was flown without an answer.
   struct Lacking {
     Instant since{0};
+    Instant awake_since{0};  // the first one of them was published, awake time of the server
     std::uint64_t held = 0;
   };
 
@@ -94,24 +105,36 @@ class FlightWatch {
   void check_policy(const model::StepRecord& record, Instant now);
   void check_gap(Instant now);
 
+  void check_start(const std::string& reason, Instant now);
+  void check_absence(const std::string& reason, const std::string& named, Instant now);
+  void check_early(const std::string& reason, Instant since, double deadline_s);
+  bool is_there(const Client& client, Instant now) const;
+  int count_recorders(Instant now) const;
+  std::vector<const Client*> find_clients(const std::string& announced_name) const;
+
   const Program& server_;
   const config::Sync& sync_;
   const sim::AnswerLimits limits_;
   const std::string& scenario_sha256_;
   const std::uint64_t run_id_;
+  const std::vector<std::uint32_t> vehicle_ids_;
+  const Instant began_;  // awake time of the server
   const std::function<void(std::string)> find_;
   std::map<std::string, Client> clients_;        // by name of the process
+  std::map<std::string, Recorder> recorders_;    // likewise
   std::set<std::string> rightful_;               // ready for this run, at any time
   std::map<std::uint32_t, std::string> flyers_;  // of the last step, by vehicle
   std::map<std::uint32_t, Lacking> lacking_;
   bool has_begun_ = false;
   std::uint64_t step_ = 0;
   Instant published_{0};
+  Instant published_awake_{0};  // the same in awake time of the server
   std::optional<Instant> sent_;  // the last state of an open step
   bool has_libraries_ = false;
   std::set<bus::PeerId> peers_;  // that announced themselves as controllers
   bool is_disturbed_ = false;    // since the last step was published
-  std::optional<Instant> interrupted_, stop_requested_, paused_;
+  Instant recorded_{0};          // the last step
+  std::optional<Instant> interrupted_, stop_requested_, paused_;  // awake time of the server
 };
 
 }  // namespace sls::worlds

@@ -165,8 +165,10 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
       recorder.queue = static_cast<std::size_t>(random.integer(1, 50));
   }
   const bool has_fleet = flown.scenario.vehicles.size() > 1 && flown.failure.empty();
+  // All programs are suspended when one server has a step: those of another one may not be there.
   if (!given && has_fleet && plan.promise != Promise::kServerRestart &&
-      plan.promise != Promise::kTwoServers && random.chance(0.25))
+      plan.promise != Promise::kTwoServers && plan.promise != Promise::kSuspend &&
+      random.chance(0.25))
     share_fleet(plan, random);
   if (!given) return;
   const auto need = [&](const faults::Program& named) {

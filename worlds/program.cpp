@@ -25,8 +25,19 @@ void Program::say(const sync::Line& line) {
   say((line.is_warning ? "warning: " : "") + line.text);
 }
 
+Instant Program::awake() const {
+  return (process_.is_stopped() ? stopped_since_ : setting_.timeline.now()) - stopped_;
+}
+
+std::optional<Instant> Program::find_heard(std::uint64_t run_id,
+                                           const bus::PeerId& server) const {
+  const auto heard = heard_.find({run_id, server});
+  return heard == heard_.end() ? std::nullopt : std::optional(heard->second);
+}
+
 void Program::stop() {
   process_.stop();
+  stopped_since_ = setting_.timeline.now();
   setting_.properties.on_stopped(*this);
 }
 
@@ -45,6 +56,8 @@ void Program::set_slowness(Instant delay) {
 void Program::go_on() {
   if (process_.has_ended()) return;
   say("continued");
+  const Instant stopped = setting_.timeline.now() - stopped_since_;
+  if (stopped >= std::chrono::milliseconds(500)) stopped_ += stopped;
   setting_.properties.on_continued(*this);
   setting_.properties.on_disturbed(*this);
   process_.go_on();
@@ -55,6 +68,7 @@ void Program::exit(int code, std::string reason) {
   ended_ = setting_.timeline.now();
   reason_ = std::move(reason);
   say(fmt::format("ends with exit code {}{}{}", code, reason_.empty() ? "" : ": ", reason_));
+  setting_.properties.on_exit(*this);
   process_.end();
   setting_.network.leave(peer_, true);
 }
@@ -113,7 +127,7 @@ void Program::look_for_unclaimed() {
   add(TopicId::kStatus, bus::Topic<SimStatus>::kName);
   add(TopicId::kRecord, bus::Topic<RecordBatch>::kName);
   for (const auto& [peer, topics] : servers_.look_for_unclaimed(writers, now()).found)
-    setting_.properties.on_unclaimed(*this, *setting_.network.find(peer));
+    setting_.properties.on_unclaimed(*this, *setting_.network.find(peer), setting_.network);
 }
 
 sync::Membership& Program::present_members() {
@@ -130,6 +144,7 @@ void Program::note(const Parameters& sample, const Peer::Arrival& arrival) {
 void Program::note(const SimStatus& sample, const Peer::Arrival& arrival) {
   servers_.set_present(peer_.matched_writers(TopicId::kParameters));
   servers_.note(sample, arrival.sender, now());
+  heard_[{sample.run_id(), arrival.sender}] = awake();
 }
 
 void Program::note(const Participant& sample, const Peer::Arrival& arrival) {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <utility>
@@ -53,6 +55,10 @@ class Program {
   /// Extra time that the processor takes for each wake-up.
   void set_slowness(Instant delay);
   bool is_slow() const { return slowness_ > Instant(0); }
+  /// Time of the world without its stops of 0.5 s and more, which no deadline may count.
+  Instant awake() const;
+  /// When a status of the run came last from `server`, in that time.
+  std::optional<Instant> find_heard(std::uint64_t run_id, const bus::PeerId& server) const;
 
  protected:
   /// Awake time of this program.
@@ -104,6 +110,8 @@ class Program {
   std::optional<int> exit_code_;
   std::string reason_;
   Instant ended_{0};
+  Instant stopped_since_{0}, stopped_{0};
+  std::map<std::pair<std::uint64_t, bus::PeerId>, Instant> heard_;  // the last status, awake
 };
 
 }  // namespace sls::worlds

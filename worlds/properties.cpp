@@ -91,7 +91,8 @@ std::vector<FlightSummary> Properties::summarise_flights() const {
 void Properties::on_run(const Program& server, std::uint64_t run_id, const Parameters& parameters,
                         const config::Scenario& scenario) {
   Run& run = runs_[run_id];
-  run.flight = std::make_unique<FlightWatch>(scenario, run_id, server,
+  run.vehicle_ids = sync::list_vehicle_ids(parameters);
+  run.flight = std::make_unique<FlightWatch>(scenario, run_id, run.vehicle_ids, server,
                                              [this](std::string text) { find(std::move(text)); });
   run.is_realtime = scenario.sync.mode == config::SyncMode::kRealtime;
   run.waits_for_recorders = scenario.sync.mode == config::SyncMode::kLockstep &&
@@ -101,7 +102,6 @@ void Properties::on_run(const Program& server, std::uint64_t run_id, const Param
                   [](const auto& fault) { return fault.on == config::FaultChannel::kCommand; });
   run.phase_since = timeline_.now();
   run.server = &server;
-  run.vehicle_ids = sync::list_vehicle_ids(parameters);
 }
 
 void Properties::on_yielded(const Program& server, std::uint64_t run_id, const Network& network) {
@@ -225,7 +225,7 @@ void Properties::check_recorders(const Run& run, std::uint64_t step,
 
 /// A participant that keeps others waiting is named.
 void Properties::check_stall(Run& run, std::uint64_t run_id) {
-  if (!run.published || run.is_stall_found) return;
+  if (!run.published || run.is_stall_found || run.server->is_slow()) return;
   const auto continued = continued_.find(run.server->name());
   const Instant since =
       continued == continued_.end() ? *run.published : std::max(*run.published, continued->second);
@@ -259,7 +259,7 @@ void Properties::check_rivals(const Run& run, const Network& network) {
 }
 
 void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate,
-                            const Network& network) {
+                            const std::string& reason, const Network& network) {
   Run& run = runs_[run_id];
   const auto full = network.last_full();
   if (run.is_realtime && !is_finished && full && timeline_.now() - *full < kLastAttempts)
@@ -269,6 +269,33 @@ void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string 
   run.is_finished = is_finished;
   if (run.began) run.summary.duration_s = sync::to_seconds(timeline_.now() - *run.began);
   run.certificate = std::move(certificate);
+  run.failure = reason;
+  run.is_failure_judged = reason.empty() || run.flight->on_failed(reason, timeline_.now());
+}
+
+void Properties::on_exit(const Program& program) {
+  if (program.role() == Role::kClient && !program.reason().empty()) check_client_end(program);
+}
+
+/// What a client says of its server is true.
+void Properties::check_client_end(const Program& client) {
+  const std::string& reason = client.reason();
+  const auto finds = [&](const std::string& but) {
+    find(fmt::format("reason: {} ends with '{}', but {}", client.name(), reason, but));
+  };
+  const auto run = runs_.find(joined_[client.name()]);
+  static const std::string kFailed = "the run failed: ";
+  if (reason.rfind(kFailed, 0) == 0) {
+    if (run == runs_.end() || !run->second.has_ended || run->second.is_finished)
+      finds("it did not");
+    else if (run->second.failure.rfind(reason.substr(kFailed.size()), 0) != 0)  // it may be cut
+      finds("that is not why: " + run->second.failure);
+  } else if (reason.find("expected it to finish") != std::string::npos && run != runs_.end()) {
+    const auto heard = client.find_heard(run->first, run->second.server->id());
+    const double deadline_s = run->second.flight->sync().wait.server_deadline_s;
+    if (heard && client.awake() - *heard < sync::to_duration(deadline_s) - FlightWatch::kSlack)
+      finds(fmt::format("heard it {:.3f} s before", sync::to_seconds(client.awake() - *heard)));
+  }
 }
 
 void Properties::on_announced(const Program& program, const Participant& message,
@@ -311,9 +338,11 @@ void Properties::on_announced(const Program& program, const Participant& message
                      message.run_id()));
 }
 
-void Properties::on_unclaimed(const Program& program, const Peer& writer) {
+void Properties::on_unclaimed(const Program& program, const Peer& writer, const Network& network) {
   const Process& process = writer.process();
-  if (process.is_server() && !process.has_ended() && !process.is_stopped())
+  const auto since = network.find_connected_since(program.id(), writer.id());
+  const bool may_know = since && timeline_.now() - *since > kHeardWithin;
+  if (process.is_server() && !process.has_ended() && !process.is_stopped() && may_know)
     find(fmt::format("claims: {} misses the claim of {}", program.name(), process.name()));
 }
 
@@ -384,7 +413,7 @@ void Properties::on_line(const Program& program, const std::string& text,
 
 void Properties::on_interrupted(const Program& program) {
   for (const auto& [run_id, run] : runs_)
-    if (run.server == &program) run.flight->on_interrupted(timeline_.now());
+    if (run.server == &program) run.flight->on_interrupted();
 }
 
 void Properties::on_killed(const Program& program) { killed_[program.name()] = timeline_.now(); }
@@ -403,6 +432,9 @@ void Properties::on_disturbed(const Program& program) {
 void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Program>>& programs,
                        const FlownScenario& flown) {
   for (const auto& [run_id, run] : runs_) {
+    const bool is_of_flight = run.failure == flown.failure || run.has_mistakes || !run.is_exact;
+    if (!run.is_failure_judged && run.has_ended && !is_of_flight)
+      find(fmt::format("reason: run {:016x} fails without a cause: {}", run_id, run.failure));
     const bool says_exact =
         run.timing == "exact" || run.timing.find("real-time, 0 of ") != std::string::npos;
     if (run.has_ended && !run.timing.empty() && says_exact != run.is_exact)

@@ -71,13 +71,14 @@ class Properties {
     runs_[run_id].flight->on_late();
   }
   void on_status(const SimStatus& status, const Network& network);
+  /// `reason`: why it failed.
   void on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate,
-                  const Network& network);
+                  const std::string& reason, const Network& network);
   /// `heard`: what the program knows of servers.
   void on_announced(const Program& program, const Participant& message, const sync::Servers& heard);
   void on_request(const SimControl& request) { requests_[request.request_id()] = request.run_id(); }
   /// The program finds a participant that writes as a server and claims nothing.
-  void on_unclaimed(const Program& program, const Peer& writer);
+  void on_unclaimed(const Program& program, const Peer& writer, const Network& network);
   /// `step`: the last complete one, as announced; `newest`: the last one received, by vehicle.
   void on_progress(const Program& recorder, std::int64_t step,
                    const std::map<std::uint32_t, std::int64_t>& newest);
@@ -88,6 +89,8 @@ class Properties {
   void on_continued(const Program& program);
   /// A program prints `text`. `heard`: what it knows of servers.
   void on_line(const Program& program, const std::string& text, const sync::Servers& heard);
+  /// A program ends by itself.
+  void on_exit(const Program& program);
   /// Its process was stopped or continued, or became slower or faster.
   void on_disturbed(const Program& program);
 
@@ -120,6 +123,8 @@ class Properties {
     Instant ended{0};
     bool is_finished = false;
     std::string certificate;
+    std::string failure;  // why it failed
+    bool is_failure_judged = false;
     std::string timing;
     RunPhase phase = RunPhase::PHASE_WAITING;
     int furthest = 0;         // progress of its furthest phase (sync::calc_progress)
@@ -152,6 +157,7 @@ class Properties {
   void check_rows(const Program& program, const StoredRecording& recording, const Run& run);
   void check_failure(const Program& server, const FlownScenario& flown);
   void check_exit(const Program& program);
+  void check_client_end(const Program& client);
   void check_begin(std::uint64_t run_id, const Run& run, const FlownScenario& flown);
   void check_end(const Program& server, const std::vector<std::unique_ptr<Program>>& programs);
 

@@ -108,7 +108,7 @@ void ServerProgram::deliver_events() {
 void ServerProgram::end_run() {
   write_waiting();
   setting_.properties.on_run_end(core_->run_id(), core_->end() == sim::ServerCore::End::kFinished,
-                                 certificate_->finish(), setting_.network);
+                                 certificate_->finish(), core_->error(), setting_.network);
   if (core_->end() == sim::ServerCore::End::kReset) return begin_run(core_->make_next_start());
   if (core_->error().find("expected no other server") != std::string::npos)
     setting_.properties.on_yielded(*this, core_->run_id(), setting_.network);

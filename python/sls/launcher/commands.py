@@ -244,9 +244,9 @@ def test(words: list[str]) -> NoReturn:
     if preset != "asan":
         call_script("@tree", preset, folder, *(["threaded_tests"] if preset == "tsan" else []))
     hidden = [f"--unset={name}" for name in STRAY_VARIABLES]
-    # Most tests wait for processes and discovery: one more than there are cores leaves none idle.
+    # Most tests wait for processes and discovery: two more than there are cores leave none idle.
     os.chdir(ROOT)
-    replace_by("env", *hidden, "ctest", "--preset", preset, "--parallel", str(len(os.sched_getaffinity(0)) + 1),
+    replace_by("env", *hidden, "ctest", "--preset", preset, "--parallel", str(len(os.sched_getaffinity(0)) + 2),
                "--output-junit", folder / "test.xml", *which)
 
 

@@ -99,6 +99,14 @@ TEST_F(RecorderCoreTest, WaitsAMinuteForAServerAndSaysSo) {
   EXPECT_EQ(core_->error(), "out: nothing recorded: no server within 60 s");
 }
 
+TEST_F(RecorderCoreTest, EachWaitForARunHasItsOwnTime) {
+  look(0);
+  record(59'000);
+  report(reset_);
+  look(60'500);
+  EXPECT_EQ(core_->phase(), Phase::kFinding);
+}
+
 TEST_F(RecorderCoreTest, AStopBeforeARunIsNoError) {
   serve(kRun, kServer, 0);
   EXPECT_EQ(look(0, "interrupted by SIGINT"), Act::kNone);

@@ -322,6 +322,9 @@ const Row kRows[] = {
      "members 1 | wrong-step 500 3 | wrong-step 500 4 | look 0 none | look 5000 none | "
      "wrong-step 500 5 | look 6000 " +
          kFoo + "sls/command: 3 answers rejected, none taken: step: expected 500, got 5"},
+    {"AnOldAnswerAfterAnotherMistakeIsOneMore",
+     "members 1 | other-run 5 5 run=cd | wrong-step 500 3 | look 0 none | look 4000 " + kFoo +
+         "sls/command: 2 answers rejected, none taken: step: expected 500, got 3"},
     {"AnswersToStepsThatAreNotPublishedAreNamedAtOnceAndForATime",
      "members 1 | wrong-step 12 13 | look 0 " + kCommand +
          "step: expected at most 12, the last published, got 13 | look 2000 " + kCommand +

@@ -376,6 +376,18 @@ TEST(ServerLockstepTest, TheNextClientTakesOverAfterItsTimeAndTheFirstComesBack)
   EXPECT_EQ(rig.status().counters().take_overs(), 2u);
 }
 
+TEST(ServerLockstepTest, EachSilentClientIsAwaitedForItsOwnTime) {
+  ServerRig rig;
+  rig.join("pilot", 2);
+  rig.join("second", 1);
+  rig.join("third");
+  rig.answer("third", 0);
+  rig.wait_until(199);
+  EXPECT_EQ(rig.step(), 0u);
+  rig.wait_until(200);
+  EXPECT_EQ(rig.step(), 1u);
+}
+
 TEST(ServerLockstepTest, APausedStepIsNotFlownWithoutItsAnswer) {
   ServerRig rig(with_policy(config::ControllerPolicy::kHold, 1));
   rig.join("pilot");
@@ -444,6 +456,24 @@ TEST(ServerLockstepTest, AMissingRecorderEndsTheRunAtTheDeadlineOrIsGivenUp) {
     EXPECT_EQ(rig.take_log().back(), "10001: step 7: the recorders are back");
     EXPECT_TRUE(waits_at_the_end());
   }
+}
+
+TEST(ServerLockstepTest, EachWaitForRecordersHasItsWholeTime) {
+  auto scenario = with_recorder(config::RecorderPolicy::kWait);
+  scenario.sync.wait.controller = {config::ControllerPolicy::kWait, 60};
+  ServerRig rig(scenario);
+  rig.note_recorder("disk", -1);
+  rig.join("pilot");
+  for (std::uint64_t step = 0; step < 2; ++step) {
+    rig.leave("disk");
+    rig.answer("pilot", step);
+    rig.wait(900);  // too short for a line
+    EXPECT_EQ(rig.phase(), Phase::kAwaitingRecorders);
+    rig.note_recorder("disk", static_cast<std::int64_t>(step));
+    EXPECT_EQ(rig.step(), step + 1);
+    rig.wait(9'500);
+  }
+  EXPECT_EQ(rig.core().error(), "");
 }
 
 TEST(ServerLockstepTest, WhileTheFullQueueGetsShorterTheWaitGoesOn) {
@@ -553,6 +583,24 @@ TEST(ServerLockstepTest, AStatusComesAtLeastEveryHalfSecond) {
   EXPECT_EQ(rig.statuses().size(), before);
   rig.wait_until(420);
   EXPECT_EQ(rig.statuses().size(), before + 1);
+}
+
+TEST(ServerLockstepTest, WhatTheAnswersOfAControllerShowIsReported) {
+  for (const bool is_ahead : {true, false}) {
+    ServerRig rig;
+    rig.join("pilot");
+    rig.show_controllers();
+    ServerRig::Answer answer;
+    answer.clock_ahead_ms = is_ahead ? 5040 : 0;
+    answer.run_id = is_ahead ? ServerRig::kRunId : 1;
+    rig.answer("pilot", answer);
+    rig.wait(is_ahead ? 500 : 5000);
+    EXPECT_EQ(rig.status().problem().to_string(),
+              is_ahead ? "controller 'pilot' on box: sls/command source timestamp: expected none "
+                         "in the future, got 5.0 s ahead of our clock"
+                       : "controller 'pilot' on box: sls/command: 1 answers rejected, none taken: "
+                         "run_id: expected 00000000000001f4, got 0000000000000001");
+  }
 }
 
 TEST(ServerLockstepTest, AMistakeThatMustLastIsReportedWhenItHas) {

@@ -43,6 +43,8 @@ TEST_F(ServerRealtimeTest, EachStateLeavesWhenItIsDue) {
   rig_.wait_until(12);
   EXPECT_EQ(rig_.take_states(), Lines{"12: state 3"});
   EXPECT_EQ(rig_.take_records(), (Lines{"0 accepted", "1 accepted", "2 accepted"}));
+  rig_.wait_until(600);
+  EXPECT_EQ(rig_.status().round_trip_p50_ns(), 1'000'000u);
 }
 
 TEST_F(ServerRealtimeTest, AnAnswerCountsUntilTheNextStateIsDue) {

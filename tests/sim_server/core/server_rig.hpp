@@ -165,6 +165,14 @@ class ServerRig : public Outputs, public Surroundings {
     stop_ = signal;
     look();
   }
+  /// The middleware knows the controllers and their endpoints.
+  void show_controllers() {
+    neighbourhood.participants = controllers_;
+    for (const sync::Member& member : controllers_) {
+      neighbourhood.command_writers[member.peer] = member.announcement.name().to_string();
+      neighbourhood.state_readers.insert(member.peer);
+    }
+  }
   void fail(const std::string& reason) { core_->on_failure(reason, now_); }
 
   // Found by the shell when it looks around.
