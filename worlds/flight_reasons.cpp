@@ -63,7 +63,7 @@ bool FlightWatch::on_failed(const std::string& reason, Instant now) {
         find_("reason: " + reason + ", but they are there");
     } else {
       Instant since = published_awake_;
-      for (const auto& [vehicle, lacking] : lacking_) since = std::min(since, lacking.awake_since);
+      for (const auto& [vehicle, lacking] : lacking_) since = std::min(since, lacking.published);
       if (refused.empty()) check_early(reason, since, deadline_s);
       check_absence(reason, named, now);
     }
@@ -79,6 +79,14 @@ bool FlightWatch::on_failed(const std::string& reason, Instant now) {
       find_("reason: " + reason + ", but its answer has no mistake");
   }
   return true;
+}
+
+/// Those that a line about the open step names are missing.
+void FlightWatch::on_line(const std::string& line, Instant now) {
+  const bool is_about_absence =
+      holds(line, ": waiting for: controller") || holds(line, ": no answer from controller");
+  if (is_about_absence && line.rfind(fmt::format("step {}: ", step_), 0) == 0)
+    check_absence(line, line.substr(0, line.find("; ")), now);
 }
 
 /// The expected ones were missing, and for as long as the scenario says.

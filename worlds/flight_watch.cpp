@@ -44,7 +44,8 @@ FlightWatch::FlightWatch(const config::Scenario& scenario, std::uint64_t run_id,
       run_id_(run_id),
       vehicle_ids_(std::move(vehicle_ids)),
       began_(server.awake()),
-      find_(std::move(find)) {}
+      find_(std::move(find)),
+      status_(sync_, server, find_) {}
 
 void FlightWatch::Client::hear(Instant now) {
   if (now - heard >= kForgottenAfter) back = now;
@@ -113,7 +114,7 @@ void FlightWatch::on_answers(const Commands& sample, const Process& sender, Inst
 
 void FlightWatch::on_request(ControlAction action, Instant now) {
   is_disturbed_ = true;
-  for (auto& [vehicle, lacking] : lacking_) lacking.since = now;  // a pause is no absence
+  for (auto& [vehicle, lacking] : lacking_) lacking.since = server_.awake();  // a pause is no absence
   if (action == ControlAction::ACTION_STOP && !stop_requested_)
     stop_requested_ = server_.awake();
   if (action != ControlAction::ACTION_PAUSE)
@@ -133,9 +134,11 @@ void FlightWatch::on_published(std::uint64_t step, Instant now) {
   disobeys(interrupted_, "SIGINT");
   disobeys(stop_requested_, "an operator's stop");
   disobeys(paused_, "an operator's pause");
+  check_due(step, now);
+  status_.on_published(step);
   // The wait for recorders between two steps is no absence of a controller.
   if (has_begun_ && is_lockstep())
-    for (auto& [vehicle, lacking] : lacking_) lacking.since += now - recorded_;
+    for (auto& [vehicle, lacking] : lacking_) lacking.since += server_.awake() - recorded_awake_;
   has_begun_ = true;
   step_ = step;
   published_ = now;
@@ -153,6 +156,26 @@ bool FlightWatch::is_unclear() const {
 
 bool FlightWatch::is_disturbed() const { return is_disturbed_ || server_.is_slow(); }
 
+/// In real time the states of a server that nothing disturbs leave when they are due.
+void FlightWatch::check_due(std::uint64_t step, Instant now) {
+  if (is_lockstep()) return;
+  if (!schedule_ || is_disturbed()) {
+    schedule_ = {step, now};
+    is_behind_ = true;
+    return;
+  }
+  const double steps = static_cast<double>(step - schedule_->first);
+  const double due_s = steps * static_cast<double>(sync_.period_ns) * 1e-9 / sync_.real_time_factor;
+  const double late_s = sync::to_seconds(now - schedule_->second) - due_s;
+  const bool is_due = std::abs(late_s) <= 0.002 + due_s * 2e-4;
+  // It waits up to 50 ms for the answer to what may have been its last state.
+  is_behind_ = is_behind_ || (late_s > 0 && late_s < 0.06);
+  if (is_behind_ && !is_due) schedule_ = {step, now};  // a server that was stopped catches up
+  if (!is_due && !is_behind_)
+    find_(fmt::format("due: step {} leaves {:.4f} s late", step, late_s));
+  is_behind_ = is_behind_ && !is_due;
+}
+
 void FlightWatch::check_gap(Instant now) {
   constexpr Instant kLongest = sim::RetransmissionTimer::kLongest + kSlack;
   if (is_lockstep() && sent_ && !is_disturbed() && now - *sent_ > kLongest)
@@ -161,6 +184,7 @@ void FlightWatch::check_gap(Instant now) {
 }
 
 void FlightWatch::on_resent(Instant now) {
+  status_.on_resent();
   check_gap(now);
   sent_ = now;
 }
@@ -168,10 +192,11 @@ void FlightWatch::on_resent(Instant now) {
 void FlightWatch::on_recorded(const std::vector<model::StepRecord>& records, Instant now) {
   check_gap(now);
   sent_.reset();
-  recorded_ = now;
+  recorded_awake_ = server_.awake();
+  status_.on_recorded(records);
   check_take_over(records, now);
   for (const model::StepRecord& record : records) {
-    check_policy(record, now);
+    check_policy(record);
     if (record.kind == model::AnswerKind::kAccepted)
       flyers_[record.vehicle_id] = record.client_name;
     else
@@ -182,14 +207,15 @@ void FlightWatch::on_recorded(const std::vector<model::StepRecord>& records, Ins
 void FlightWatch::on_running(Instant now) {
   check_gap(now);
   const Instant patience = sync::to_duration(sync_.calc_controller_patience_s()) + kGivesUpWithin;
+  const Instant awake = server_.awake();
   if (is_disturbed() || !sent_) return;  // no step is flown while a recorder is waited for
   for (const auto& [vehicle, lacking] : lacking_)
-    if (now - lacking.since > patience)
+    if (awake - lacking.since > patience)
       return find_(fmt::format("gives-up: vehicle {} is flown without answers for {:.3f} s",
-                               vehicle, sync::to_seconds(now - lacking.since)));
-  if (now - published_ > patience)
+                               vehicle, sync::to_seconds(awake - lacking.since)));
+  if (awake - published_awake_ > patience)
     find_(fmt::format("gives-up: step {} waits for {:.3f} s", step_,
-                      sync::to_seconds(now - published_)));
+                      sync::to_seconds(awake - published_awake_)));
 }
 
 /// A step ends when each vehicle has the answer that it awaits: another client's, if the stronger
@@ -273,7 +299,7 @@ std::vector<std::pair<std::string, const FlightWatch::Client&>> FlightWatch::lis
   return stronger;
 }
 
-void FlightWatch::check_policy(const model::StepRecord& record, Instant now) {
+void FlightWatch::check_policy(const model::StepRecord& record) {
   const auto policy = sync_.wait.controller.policy;
   if (record.kind == model::AnswerKind::kNone) return;  // the run has ended
   const bool is_held = record.kind == model::AnswerKind::kHeld;
@@ -284,7 +310,7 @@ void FlightWatch::check_policy(const model::StepRecord& record, Instant now) {
   if (is_lockstep() &&
       (policy == config::ControllerPolicy::kWait || policy == config::ControllerPolicy::kStop))
     find_(fmt::format("policy: step {} is flown without an answer", record.step));
-  Lacking& lacking = lacking_.try_emplace(record.vehicle_id, Lacking{now, published_awake_, 0}).first->second;
+  Lacking& lacking = lacking_.try_emplace(record.vehicle_id, Lacking{server_.awake(), published_awake_, 0}).first->second;
   lacking.held += is_held;
   const double held_s =
       static_cast<double>(lacking.held) * static_cast<double>(sync_.period_ns) * 1e-9;

@@ -19,6 +19,7 @@
 #include "sim_server/core/answers/judgement.hpp"
 #include "sls.h"
 #include "worlds/host.hpp"
+#include "worlds/status_check.hpp"
 
 namespace sls::worlds {
 
@@ -54,8 +55,14 @@ class FlightWatch {
   bool on_failed(const std::string& reason, Instant now);
   const config::Sync& sync() const { return sync_; }
   void on_interrupted();
+  void on_status(const SimStatus& status) { status_.on_status(status); }
+  /// The server says `line`.
+  void on_line(const std::string& line, Instant now);
   /// Its process was stopped or continued, or became slower or faster: it may be late with all.
-  void on_disturbed() { is_disturbed_ = true; }
+  void on_disturbed() {
+    is_disturbed_ = true;
+    status_.on_disturbed();
+  }
 
  private:
   struct Client {
@@ -89,8 +96,8 @@ class FlightWatch {
   };
   /// Steps in a row that a vehicle was flown without an answer.
   struct Lacking {
-    Instant since{0};
-    Instant awake_since{0};  // the first one of them was published, awake time of the server
+    Instant since{0};        // awake time of the server, without pauses and waits for recorders
+    Instant published{0};    // the first one of them, awake time of the server
     std::uint64_t held = 0;
   };
 
@@ -102,8 +109,9 @@ class FlightWatch {
   std::vector<std::pair<std::string, const Client&>> list_stronger(const Client& flyer,
                                                                    std::uint32_t vehicle) const;
   std::optional<Instant> check_flyer(const model::StepRecord& record, Instant now);
-  void check_policy(const model::StepRecord& record, Instant now);
+  void check_policy(const model::StepRecord& record);
   void check_gap(Instant now);
+  void check_due(std::uint64_t step, Instant now);
 
   void check_start(const std::string& reason, Instant now);
   void check_absence(const std::string& reason, const std::string& named, Instant now);
@@ -133,7 +141,10 @@ class FlightWatch {
   bool has_libraries_ = false;
   std::set<bus::PeerId> peers_;  // that announced themselves as controllers
   bool is_disturbed_ = false;    // since the last step was published
-  Instant recorded_{0};          // the last step
+  StatusCheck status_;
+  std::optional<std::pair<std::uint64_t, Instant>> schedule_;  // a step and when it left
+  bool is_behind_ = false;                                     // since a disturbance
+  Instant recorded_awake_{0};    // the last step, in awake time of the server
   std::optional<Instant> interrupted_, stop_requested_, paused_;  // awake time of the server
 };
 

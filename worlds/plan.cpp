@@ -310,7 +310,8 @@ void draw_suspension(Plan& plan, Random& random, const FlownScenario& flown) {
   }
   const config::Sync& sync = flown.scenario.sync;
   const double others_wait_s = std::min(sync.wait.server_deadline_s, sync.wait_for.timeout_s);
-  const Instant duration = draw_seconds(random, 0.5, is_of_server ? others_wait_s - 2 : 20);
+  // They wait since their own starts, and a server claims its vehicles for a second.
+  const Instant duration = draw_seconds(random, 0.5, is_of_server ? others_wait_s - 4 : 20);
   for (stop.target = 0; stop.target < plan.programs.size(); ++stop.target) {
     if (is_of_server && plan.programs[stop.target].role != Role::kServer) continue;
     stop.duration = duration + draw_time(random, 0ms, 20ms);  // they go on one after another

@@ -30,6 +30,8 @@ constexpr Instant kQuietTime = 900ms;
 constexpr Instant kBeginsWithin = 60ms;
 /// The others have heard of it, unless something is in the way.
 constexpr Instant kHeardWithin = 2s;
+/// The same over links that lose most: statuses come in their order.
+constexpr Instant kKnownWithin = 10s;
 /// Time for which a server in real time asks for the last answers (sim::RealtimePacing).
 constexpr Instant kLastAttempts = 1s;
 
@@ -114,7 +116,7 @@ void Properties::on_yielded(const Program& server, std::uint64_t run_id, const N
       return run.has_status ? sync::calc_progress(run.phase) : 0;
     };
     const auto has_changed = [&](const Run& run) {
-      return run.has_status && timeline_.now() - run.phase_since < kHeardWithin;
+      return run.has_status && timeline_.now() - run.phase_since < kKnownWithin;
     };
     if (has_changed(other)) return true;
     // If its goodbye is lost, others keep its last known phase until its lease expires.
@@ -190,6 +192,7 @@ void Properties::check_applied(const model::StepRecord& before, const model::Ste
 
 void Properties::on_status(const SimStatus& status, const Network& network) {
   Run& run = runs_[status.run_id()];
+  run.flight->on_status(status);
   run.timing = status.timing().to_string();
   if (!run.has_status || run.phase != status.phase()) run.phase_since = timeline_.now();
   run.has_status = true;
@@ -226,9 +229,7 @@ void Properties::check_recorders(const Run& run, std::uint64_t step,
 /// A participant that keeps others waiting is named.
 void Properties::check_stall(Run& run, std::uint64_t run_id) {
   if (!run.published || run.is_stall_found || run.server->is_slow()) return;
-  const auto continued = continued_.find(run.server->name());
-  const Instant since =
-      continued == continued_.end() ? *run.published : std::max(*run.published, continued->second);
+  const Instant since = std::max(*run.published, run.disturbed);
   if (timeline_.now() - since < kNamedWithin || run.named >= *run.published) return;
   run.is_stall_found = true;
   find(fmt::format("named: run {:016x} stands still since {:.3f} s, and nobody is named", run_id,
@@ -392,9 +393,24 @@ void Properties::on_replied(const Program& server, std::uint64_t request_id,
 
 void Properties::on_stopped(const Program& program) { stopped_[program.name()] = timeline_.now(); }
 
-/// A program that was stopped itself does not say that its server is silent.
+/// A program that was stopped itself does not say that its server is silent, and no program says
+/// that it was silent for longer than it was.
 void Properties::on_line(const Program& program, const std::string& text,
                          const sync::Servers& heard) {
+  for (auto& [run_id, run] : runs_)
+    if (run.server == &program) run.flight->on_line(text, timeline_.now());
+  static const std::string kServer = "server of run ", kSilent = "(silent for ";
+  const std::size_t named = text.find(kServer), silent = text.find(kSilent);
+  if (named != std::string::npos && silent != std::string::npos) {
+    const auto run = runs_.find(std::stoull(text.substr(named + kServer.size(), 16), nullptr, 16));
+    const auto last = run == runs_.end()
+                          ? std::nullopt
+                          : program.find_heard(run->first, run->second.server->id());
+    const double said_s = std::stod(text.substr(silent + kSilent.size()));
+    if (last && said_s > sync::to_seconds(program.awake() - *last) + 0.1)
+      find(fmt::format("named: {} says '{}', but heard it {:.3f} s before", program.name(), text,
+                       sync::to_seconds(program.awake() - *last)));
+  }
   const auto continued = continued_.find(program.name());
   if (continued == continued_.end() || timeline_.now() - continued->second > kQuietTime / 2 ||
       text.find("(silent for ") == std::string::npos)
@@ -423,8 +439,11 @@ void Properties::on_continued(const Program& program) {
 }
 
 void Properties::on_disturbed(const Program& program) {
-  for (const auto& [run_id, run] : runs_)
-    if (run.server == &program) run.flight->on_disturbed();
+  for (auto& [run_id, run] : runs_)
+    if (run.server == &program) {
+      run.disturbed = timeline_.now();
+      run.flight->on_disturbed();
+    }
 }
 
 // --- at its end ----------------------------------------------------------------------------------

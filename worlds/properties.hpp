@@ -136,6 +136,7 @@ class Properties {
     Instant phase_since{0};
     bool was_paused = false;
     std::optional<Instant> published;  // the last step
+    Instant disturbed{0};              // its server was stopped, continued, slowed down or let go
     std::optional<Instant> began;      // the first step
     FlightSummary summary;
     Instant named{-1};  // the last status with a reason
