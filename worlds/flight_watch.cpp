@@ -156,24 +156,17 @@ bool FlightWatch::is_unclear() const {
 
 bool FlightWatch::is_disturbed() const { return is_disturbed_ || server_.is_slow(); }
 
-/// In real time the states of a server that nothing disturbs leave when they are due.
+/// In real time no state leaves before it is due, whatever happens; and without a disturbance none
+/// is much later than the time for which a server waits for what may be the last answer.
 void FlightWatch::check_due(std::uint64_t step, Instant now) {
   if (is_lockstep()) return;
-  if (!schedule_ || is_disturbed()) {
-    schedule_ = {step, now};
-    is_behind_ = true;
-    return;
-  }
+  if (!schedule_) schedule_ = {step, now};
+  was_disturbed_ = was_disturbed_ || is_disturbed();
   const double steps = static_cast<double>(step - schedule_->first);
   const double due_s = steps * static_cast<double>(sync_.period_ns) * 1e-9 / sync_.real_time_factor;
   const double late_s = sync::to_seconds(now - schedule_->second) - due_s;
-  const bool is_due = std::abs(late_s) <= 0.002 + due_s * 2e-4;
-  // It waits up to 50 ms for the answer to what may have been its last state.
-  is_behind_ = is_behind_ || (late_s > 0 && late_s < 0.06);
-  if (is_behind_ && !is_due) schedule_ = {step, now};  // a server that was stopped catches up
-  if (!is_due && !is_behind_)
+  if (late_s < -0.001 - due_s * 2e-4 || (!was_disturbed_ && late_s > 0.06))
     find_(fmt::format("due: step {} leaves {:.4f} s late", step, late_s));
-  is_behind_ = is_behind_ && !is_due;
 }
 
 void FlightWatch::check_gap(Instant now) {

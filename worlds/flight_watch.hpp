@@ -35,6 +35,9 @@ class FlightWatch {
               std::vector<std::uint32_t> vehicle_ids, const Program& server,
               std::function<void(std::string)> find);
 
+  /// The run before it, of the same server: participants that it knows announce themselves once.
+  void follow(const FlightWatch& before) { peers_ = before.peers_; }
+
   // --- arrives at the server ---
 
   void on_member(const Participant& message, const bus::PeerId& peer, const Process& sender,
@@ -142,8 +145,8 @@ class FlightWatch {
   std::set<bus::PeerId> peers_;  // that announced themselves as controllers
   bool is_disturbed_ = false;    // since the last step was published
   StatusCheck status_;
-  std::optional<std::pair<std::uint64_t, Instant>> schedule_;  // a step and when it left
-  bool is_behind_ = false;                                     // since a disturbance
+  std::optional<std::pair<std::uint64_t, Instant>> schedule_;  // the first step and when it left
+  bool was_disturbed_ = false;                                 // at any time
   Instant recorded_awake_{0};    // the last step, in awake time of the server
   std::optional<Instant> interrupted_, stop_requested_, paused_;  // awake time of the server
 };

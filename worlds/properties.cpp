@@ -96,6 +96,8 @@ void Properties::on_run(const Program& server, std::uint64_t run_id, const Param
   run.vehicle_ids = sync::list_vehicle_ids(parameters);
   run.flight = std::make_unique<FlightWatch>(scenario, run_id, run.vehicle_ids, server,
                                              [this](std::string text) { find(std::move(text)); });
+  for (const auto& [before_id, before] : runs_)
+    if (before.server == &server) run.flight->follow(*before.flight);
   run.is_realtime = scenario.sync.mode == config::SyncMode::kRealtime;
   run.waits_for_recorders = scenario.sync.mode == config::SyncMode::kLockstep &&
                             scenario.sync.wait.recorder.policy == config::RecorderPolicy::kWait;
@@ -211,11 +213,9 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
 /// Those that the server may presume alive: it need not know of a recent death, and the last
 /// message of a killed one may have waited for a server that was stopped.
 int Properties::count_living(const Run& run, const std::set<std::string>& names) const {
-  const auto continued = continued_.find(run.server->name());
-  const Instant read = continued == continued_.end() ? Instant(0) : continued->second;
   return static_cast<int>(std::count_if(names.begin(), names.end(), [&](const auto& name) {
     const auto killed = killed_.find(name);
-    return killed == killed_.end() || timeline_.now() - std::max(killed->second, read) < kGoneAfter;
+    return killed == killed_.end() || timeline_.now() - std::max(killed->second, run.disturbed) < kGoneAfter;
   }));
 }
 

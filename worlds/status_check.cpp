@@ -65,7 +65,9 @@ void StatusCheck::on_status(const SimStatus& status) {
   const bool is_finished = status.phase() == RunPhase::PHASE_FINISHED;
   if (is_over_ && flown_ > 0 && !holds(flown_) && (is_finished || !holds(answered_)))
     find_(fmt::format("timing-label: expected '{}', got '{}'", describe_timing(flown_), timing));
-  if (is_over_ && (accepted_ > 0) != (status.round_trip_p50_ns() > 0))
+  const bool has_round_trips = status.round_trip_p50_ns() > 0;
+  const bool was_answered = flown_ > 0 && held_ + fail_safe_ == 0;  // each step, for all vehicles
+  if (is_over_ && (was_answered > has_round_trips || has_round_trips > (accepted_ > 0)))
     find_("status: round trips are said without answers, or not said with them");
   last_ = status;
   last_time_ = now;

@@ -4,6 +4,8 @@
 
 #include <chrono>
 
+#include "common/sync/invariant.hpp"
+
 namespace sls::record {
 namespace {
 
@@ -85,6 +87,7 @@ bool RunWatch::is_announcement_due(const Now& now) {
   is_ready_ = is_ready_ || is_now_ready;
   const auto age = now.time - announced_time_;
   const std::int64_t news = now.last_complete_step - announced_step_;
+  sync::keep(news >= 0, "the last complete step of a recording never goes back");
   const bool is_due =
       is_now_ready || age >= kAnnounceTime || news >= kManySteps || (news > 0 && age >= kNewsTime);
   if (!is_due) return false;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/bus/convert.hpp"
+#include "common/sync/invariant.hpp"
 #include "common/sync/servers.hpp"
 
 namespace sls::record {
@@ -156,6 +157,7 @@ void Stream::hand_on_settled_steps() {
     sink_(pending_.front());
     pending_.pop_front();
   }
+  sync::keep(pending_.size() <= kMaxPending, "a bounded number of steps waits for late answers");
 }
 
 std::int64_t Stream::last_step() const {

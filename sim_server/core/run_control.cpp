@@ -7,6 +7,7 @@
 
 #include "common/bus/names.hpp"
 #include "common/config/vehicle_ids.hpp"
+#include "common/sync/invariant.hpp"
 
 namespace sls::sim {
 namespace {
@@ -141,6 +142,7 @@ bool RunControl::holds() const {
 std::optional<SimControlReply> RunControl::stepped(std::uint64_t step) {
   if (!stepping_) return std::nullopt;
   ++stepping_->done;
+  sync::keep(stepping_->done <= stepping_->steps, "a request of N steps flies N");
   if (stepping_->done >= stepping_->steps) return close_step_request(step, "");
   if (stepping_->cut_short_by.empty()) return std::nullopt;
   return close_step_request(step,

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "common/sync/invariant.hpp"
 #include "sim_server/core/pacing/lockstep_pacing.hpp"
 #include "sim_server/core/pacing/realtime_pacing.hpp"
 
@@ -24,6 +25,12 @@ std::unique_ptr<Pacing> make_pacing(RunParts& parts) {
   if (parts.scenario.sync.mode == config::SyncMode::kRealtime)
     return std::make_unique<RealtimePacing>(parts);
   return std::make_unique<LockstepPacing>(parts);
+}
+
+bool may_fly_without_answers(const config::Sync& sync) {
+  const auto policy = sync.wait.controller.policy;
+  return sync.mode == config::SyncMode::kRealtime || policy == config::ControllerPolicy::kHold ||
+         policy == config::ControllerPolicy::kFailsafe;
 }
 
 }  // namespace
@@ -215,6 +222,7 @@ void ServerCore::publish_if_allowed(sync::Time now) {
   end_rest(now);
   phase_ = Phase::kAwaitingDue;
   if (now < pacing_->due()) return;
+  sync::keep(preparation_.is_claimed(), "no state leaves before the claim is settled");
   phase_ = Phase::kAwaitingAnswers;
   const Moment moment = parts_.outputs.send_states(parts_.fleet);
   published_ = moment.time;
@@ -237,8 +245,15 @@ void ServerCore::finish_step(sync::Time now) {
   if (parts_.fleet.is_finished())
     return end_run(End::kFinished, RunPhase::PHASE_FINISHED, "mission finished", now);
   parts_.outputs.record_step(parts_.fleet);
-  for (const auto& vehicle : parts_.fleet.vehicles())
-    parts_.report.series.timing.add(vehicle->record().kind, vehicle->calc_age());
+  const config::Sync& sync = parts_.scenario.sync;
+  for (const auto& vehicle : parts_.fleet.vehicles()) {
+    const model::AnswerKind kind = vehicle->record().kind;
+    const bool is_held =
+        kind == model::AnswerKind::kHeld || kind == model::AnswerKind::kFailSafe;
+    sync::keep(kind == model::AnswerKind::kAccepted || (is_held && may_fly_without_answers(sync)),
+               "each step is flown with an answer, unless the policy is hold or failsafe");
+    parts_.report.series.timing.add(kind, vehicle->calc_age());
+  }
   phase_ = Phase::kAwaitingDue;  // its states are recorded: no second time, should a plant fail
   parts_.fleet.advance();
   parts_.announce_remarks(now);

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/sync/invariant.hpp"
+
 namespace sls::sim {
 namespace {
 
@@ -194,6 +196,7 @@ void CommandGate::settle() {
   if (!awaited || !awaited->held) return;
   accepted_from_ = awaited->identity.peer;
   accepted_ = std::exchange(find_client(accepted_from_)->held, std::nullopt);
+  sync::keep(accepted_->step == step_, "a force answers the state of its own step");
   if (flyer_ && flyer_->peer != accepted_from_) {
     take_over_ = TakeOver{flyer_->name, awaited->identity.name};
     ++counters_.take_overs();

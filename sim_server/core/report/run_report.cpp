@@ -3,10 +3,16 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "common/bus/sync_counters.hpp"
+#include "common/sync/invariant.hpp"
+#include "common/sync/servers.hpp"
 
 namespace sls::sim {
 
 void RunReport::publish(RunPhase phase, const std::string& reason, sync::Time now) {
+  const int before = has_published() ? sync::calc_progress(phase_) : 0;
+  sync::keep(before >= 0 ? sync::calc_progress(phase) < 0 || sync::calc_progress(phase) >= before
+                         : phase_ == RunPhase::PHASE_RESET && phase == RunPhase::PHASE_FAILED,
+             "a run never goes back to an earlier phase");
   phase_ = phase;
   SyncCounters counters = link;
   for (const auto& vehicle : fleet_.vehicles()) bus::add(counters, vehicle->gate.counters());
