@@ -146,7 +146,6 @@ class FlightWatch {
   bool is_disturbed_ = false;    // since the last step was published
   StatusCheck status_;
   std::optional<std::pair<std::uint64_t, Instant>> schedule_;  // the first step and when it left
-  bool was_disturbed_ = false;                                 // at any time
   Instant recorded_awake_{0};    // the last step, in awake time of the server
   std::optional<Instant> interrupted_, stop_requested_, paused_;  // awake time of the server
 };

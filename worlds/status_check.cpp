@@ -36,6 +36,7 @@ void StatusCheck::on_recorded(const std::vector<model::StepRecord>& records) {
 void StatusCheck::on_status(const SimStatus& status) {
   const Instant now = server_.awake();
   is_disturbed_ = is_disturbed_ || server_.is_slow();
+  was_disturbed_ = was_disturbed_ || is_disturbed_;
   if (last_) {
     if (!is_disturbed_ && now - last_time_ > kLongestInterval)
       find_(fmt::format("status: sample {} comes {:.3f} s after the one before",
@@ -66,7 +67,7 @@ void StatusCheck::on_status(const SimStatus& status) {
   if (is_over_ && flown_ > 0 && !holds(flown_) && (is_finished || !holds(answered_)))
     find_(fmt::format("timing-label: expected '{}', got '{}'", describe_timing(flown_), timing));
   const bool has_round_trips = status.round_trip_p50_ns() > 0;
-  const bool was_answered = flown_ > 0 && held_ + fail_safe_ == 0;  // each step, for all vehicles
+  const bool was_answered = !was_disturbed_ && flown_ > 0 && held_ + fail_safe_ == 0;
   if (is_over_ && (was_answered > has_round_trips || has_round_trips > (accepted_ > 0)))
     find_("status: round trips are said without answers, or not said with them");
   last_ = status;

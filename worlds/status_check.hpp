@@ -47,7 +47,8 @@ class StatusCheck {
   std::map<std::uint32_t, std::string> flyers_;  // the last ones, by vehicle
   std::optional<SimStatus> last_;
   Instant last_time_{0};  // awake time of the server
-  bool is_disturbed_ = false;
+  bool is_disturbed_ = false;   // since the last status
+  bool was_disturbed_ = false;  // at any time
   bool is_over_ = false;
 };
 

@@ -131,6 +131,13 @@ TEST_F(MembershipTest, OthersCannotFillTheMemory) {
   const auto members = members_.all();
   EXPECT_TRUE(std::any_of(members.begin(), members.end(),
                           [&](const Member& member) { return member.peer == newcomer; }));
+  Participant last = controller();
+  last.done(true);
+  members_.note(last, stranger(4), {at(2), {}, 0ns});
+  present.erase(stranger(4));
+  members_.set_present(present);
+  members_.note(controller(), stranger(5), {at(2), {}, 0ns});
+  EXPECT_EQ(members_.count_done(kController, kRun), 1) << "one that is known needs no room";
 }
 
 }  // namespace

@@ -167,8 +167,9 @@ class ServerRig : public Outputs, public Surroundings {
   }
   /// The middleware knows the controllers and their endpoints.
   void show_controllers() {
-    neighbourhood.participants = controllers_;
-    for (const sync::Member& member : controllers_) {
+    for (sync::Member member : controllers_) {
+      member.announcement.vehicle_ids({0});
+      neighbourhood.participants.push_back(member);
       neighbourhood.command_writers[member.peer] = member.announcement.name().to_string();
       neighbourhood.state_readers.insert(member.peer);
     }
