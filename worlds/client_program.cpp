@@ -87,9 +87,13 @@ void ClientProgram::wake() {
 void ClientProgram::begin() {
   answerer_ = std::make_unique<control::Answerer>(
       scenario_, *core_.run(), core_.list_flown_ids(),
-      control::Answerer::Options{name(), options_.strength, false, options_.make_law,
+      control::Answerer::Options{name(),
+                                 options_.strength,
+                                 false,
+                                 options_.make_law,
                                  [this] { return now(); },
-                                 [this](const std::string& line) { say(line); }});
+                                 [this](const std::string& line) { say(line); },
+                                 {}});
   say(fmt::format("joins run {:016x}", core_.run()->parameters.run_id()));
   announce_state();
 }

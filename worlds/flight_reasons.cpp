@@ -94,12 +94,10 @@ void FlightWatch::check_start(const std::string& reason, Instant now) {
   check_early(reason, began_, sync_.wait_for.timeout_s);
   if (is_unclear() || count_recorders(now) < sync_.wait_for.recorders) return;
   for (const std::uint32_t vehicle : vehicle_ids_) {
-    const auto there =
-        std::count_if(clients_.begin(), clients_.end(), [&](const auto& item) {
-          const auto& ids = item.second.vehicle_ids;
-          return std::find(ids.begin(), ids.end(), vehicle) != ids.end() &&
-                 is_there(item.second, now);
-        });
+    const auto there = std::count_if(clients_.begin(), clients_.end(), [&](const auto& item) {
+      const auto& ids = item.second.vehicle_ids;
+      return std::find(ids.begin(), ids.end(), vehicle) != ids.end() && is_there(item.second, now);
+    });
     if (there < sync_.wait_for.controllers) return;
   }
   find_("reason: " + reason + ", but all are there");
@@ -132,8 +130,8 @@ void FlightWatch::check_absence(const std::string& reason, const std::string& na
 void FlightWatch::check_early(const std::string& reason, Instant since, double deadline_s) {
   const Instant waited = server_.awake() - since;
   if (waited < sync::to_duration(deadline_s) - kSlack)
-    find_(fmt::format("reason: {}, but only {:.3f} s have passed", reason,
-                      sync::to_seconds(waited)));
+    find_(
+        fmt::format("reason: {}, but only {:.3f} s have passed", reason, sync::to_seconds(waited)));
 }
 
 bool FlightWatch::is_there(const Client& client, Instant now) const {

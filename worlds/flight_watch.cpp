@@ -112,11 +112,11 @@ void FlightWatch::on_answers(const Commands& sample, const Process& sender, Inst
         .try_emplace(command.vehicle_id(), now);
 }
 
-void FlightWatch::on_request(ControlAction action, Instant now) {
+void FlightWatch::on_request(ControlAction action) {
   is_disturbed_ = true;
-  for (auto& [vehicle, lacking] : lacking_) lacking.since = server_.awake();  // a pause is no absence
-  if (action == ControlAction::ACTION_STOP && !stop_requested_)
-    stop_requested_ = server_.awake();
+  for (auto& [vehicle, lacking] : lacking_)
+    lacking.since = server_.awake();  // a pause is no absence
+  if (action == ControlAction::ACTION_STOP && !stop_requested_) stop_requested_ = server_.awake();
   if (action != ControlAction::ACTION_PAUSE)
     paused_.reset();
   else if (!paused_)
@@ -301,7 +301,9 @@ void FlightWatch::check_policy(const model::StepRecord& record) {
   if (is_lockstep() &&
       (policy == config::ControllerPolicy::kWait || policy == config::ControllerPolicy::kStop))
     find_(fmt::format("policy: step {} is flown without an answer", record.step));
-  Lacking& lacking = lacking_.try_emplace(record.vehicle_id, Lacking{server_.awake(), published_awake_, 0}).first->second;
+  Lacking& lacking =
+      lacking_.try_emplace(record.vehicle_id, Lacking{server_.awake(), published_awake_, 0})
+          .first->second;
   lacking.held += is_held;
   const double held_s =
       static_cast<double>(lacking.held) * static_cast<double>(sync_.period_ns) * 1e-9;

@@ -43,7 +43,7 @@ class FlightWatch {
   void on_member(const Participant& message, const bus::PeerId& peer, const Process& sender,
                  Instant now);
   void on_answers(const Commands& sample, const Process& sender, Instant now);
-  void on_request(ControlAction action, Instant now);
+  void on_request(ControlAction action);
 
   // --- the server does ---
 
@@ -73,11 +73,11 @@ class FlightWatch {
     std::tuple<std::int32_t, std::string, bus::PeerId> order;  // the first one is the strongest
     std::vector<std::uint32_t> vehicle_ids;
     bool is_ready = false;
-    Instant ready{0};  // its first announcement that says so
-    Instant left{0};   // its first one after that which does not
-    Instant heard{0};  // its last sample
+    Instant ready{0};        // its first announcement that says so
+    Instant left{0};         // its first one after that which does not
+    Instant heard{0};        // its last sample
     Instant heard_awake{0};  // the same in awake time of the server
-    Instant back{0};   // the first one after a long silence
+    Instant back{0};         // the first one after a long silence
     std::uint64_t answered_step = 0;
     std::map<std::uint32_t, Instant> answers;  // the first ones to that step, by vehicle
     std::map<std::uint32_t, Instant> refused;  // the first defective ones to it
@@ -99,8 +99,8 @@ class FlightWatch {
   };
   /// Steps in a row that a vehicle was flown without an answer.
   struct Lacking {
-    Instant since{0};        // awake time of the server, without pauses and waits for recorders
-    Instant published{0};    // the first one of them, awake time of the server
+    Instant since{0};      // awake time of the server, without pauses and waits for recorders
+    Instant published{0};  // the first one of them, awake time of the server
     std::uint64_t held = 0;
   };
 
@@ -139,14 +139,14 @@ class FlightWatch {
   bool has_begun_ = false;
   std::uint64_t step_ = 0;
   Instant published_{0};
-  Instant published_awake_{0};  // the same in awake time of the server
+  Instant published_awake_{0};   // the same in awake time of the server
   std::optional<Instant> sent_;  // the last state of an open step
   bool has_libraries_ = false;
   std::set<bus::PeerId> peers_;  // that announced themselves as controllers
   bool is_disturbed_ = false;    // since the last step was published
   StatusCheck status_;
   std::optional<std::pair<std::uint64_t, Instant>> schedule_;  // the first step and when it left
-  Instant recorded_awake_{0};    // the last step, in awake time of the server
+  Instant recorded_awake_{0};  // the last step, in awake time of the server
   std::optional<Instant> interrupted_, stop_requested_, paused_;  // awake time of the server
 };
 

@@ -95,8 +95,9 @@ std::optional<Instant> Network::find_connected_since(const bus::PeerId& a,
   for (const auto& [from, to] : {std::pair(find(a), find(b)), std::pair(find(b), find(a))}) {
     const auto known = from->known().find(to->id());
     const Link& link = links_.at({&from->process().host(), &to->process().host()});
-    if (known == from->known().end() || link.is_cut) return std::nullopt;
-    since = std::max({since, known->second, link.mended});
+    if (known == from->known().end() || link.is_cut || link.stalled_until > timeline_.now())
+      return std::nullopt;
+    since = std::max({since, known->second, link.mended, link.stalled_until});
   }
   return since;
 }
@@ -192,6 +193,7 @@ Instant Network::draw_delay(const Peer& from, const Peer& to) {
     way.busy_until = std::max(way.busy_until, timeline_.now()) + way.packet_time;
     delay += way.busy_until - timeline_.now();
   }
+  delay += std::max(way.stalled_until - timeline_.now(), Instant(0));
   if (random_.chance(way.reordering)) delay += Instant(random_.integer(0, way.late_by.count()));
   return delay;
 }

@@ -33,10 +33,11 @@ struct Link {
   double reordering = 0;  ///< a datagram is late by up to `late_by`
   Instant late_by{0};
   bool is_cut = false;
-  Instant mended{0};       ///< the end of its last cut
-  double duplicates = 0;   ///< best-effort samples that are sent twice
-  Instant packet_time{0};  ///< per datagram; 0: no limit
-  Instant busy_until{0};   ///< of the queue before it
+  Instant mended{0};         ///< the end of its last cut
+  double duplicates = 0;     ///< best-effort samples that are sent twice
+  Instant packet_time{0};    ///< per datagram; 0: no limit
+  Instant busy_until{0};     ///< of the queue before it
+  Instant stalled_until{0};  ///< what is sent before arrives after this
 };
 
 /// Time that a link of `bandwidth_mbit` needs for a datagram. Every sample counts as a full one.

@@ -249,6 +249,7 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
       fault.value = static_cast<double>(random.integer(1, 20));
       break;
     case Kind::kPartition:
+    case Kind::kStall:
       break;
     case Kind::kClog:
       fault.value = random.between(0.3, 4);
@@ -562,6 +563,13 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
   if (plan.promise == Promise::kNone && random.chance(0.1))
     plan.record_history = static_cast<std::size_t>(random.integer(5, 50));
   draw_faults(plan, random, flown);
+  if (plan.promise == Promise::kNone && random.chance(0.15)) {
+    Fault stall;
+    stall.kind = Kind::kStall;
+    time_fault(stall, random, plan, flown);
+    stall.duration = draw_time(random, 1ms, random.chance(0.3) ? Instant(15s) : Instant(3s));
+    plan.faults.push_back(stall);
+  }
   // Faults then last beyond every deadline.
   if (plan.promise == Promise::kNone && random.chance(0.2))
     plan.healed += draw_time(random, 0s, 30s);

@@ -29,8 +29,7 @@ Instant Program::awake() const {
   return (process_.is_stopped() ? stopped_since_ : setting_.timeline.now()) - stopped_;
 }
 
-std::optional<Instant> Program::find_heard(std::uint64_t run_id,
-                                           const bus::PeerId& server) const {
+std::optional<Instant> Program::find_heard(std::uint64_t run_id, const bus::PeerId& server) const {
   const auto heard = heard_.find({run_id, server});
   return heard == heard_.end() ? std::nullopt : std::optional(heard->second);
 }

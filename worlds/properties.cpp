@@ -215,7 +215,8 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
 int Properties::count_living(const Run& run, const std::set<std::string>& names) const {
   return static_cast<int>(std::count_if(names.begin(), names.end(), [&](const auto& name) {
     const auto killed = killed_.find(name);
-    return killed == killed_.end() || timeline_.now() - std::max(killed->second, run.disturbed) < kGoneAfter;
+    return killed == killed_.end() ||
+           timeline_.now() - std::max(killed->second, run.disturbed) < kGoneAfter;
   }));
 }
 
@@ -393,6 +394,19 @@ void Properties::on_replied(const Program& server, std::uint64_t request_id,
 
 void Properties::on_stopped(const Program& program) { stopped_[program.name()] = timeline_.now(); }
 
+/// The server of `run` was silent for as long as `program` says.
+void Properties::check_silence(const Program& program,
+                               const std::pair<const std::uint64_t, Run>& run, double said_s) {
+  const auto heard = program.find_heard(run.first, run.second.server->id());
+  if (!heard) return;
+  const double silent_s = sync::to_seconds(program.awake() - *heard);
+  if (said_s > silent_s + 0.1)
+    find(
+        fmt::format("named: {} says that run {:016x} is silent for {:.1f} s, and heard it {:.3f} s "
+                    "before",
+                    program.name(), run.first, said_s, silent_s));
+}
+
 /// A program that was stopped itself does not say that its server is silent, and no program says
 /// that it was silent for longer than it was.
 void Properties::on_line(const Program& program, const std::string& text,
@@ -403,13 +417,8 @@ void Properties::on_line(const Program& program, const std::string& text,
   const std::size_t named = text.find(kServer), silent = text.find(kSilent);
   if (named != std::string::npos && silent != std::string::npos) {
     const auto run = runs_.find(std::stoull(text.substr(named + kServer.size(), 16), nullptr, 16));
-    const auto last = run == runs_.end()
-                          ? std::nullopt
-                          : program.find_heard(run->first, run->second.server->id());
     const double said_s = std::stod(text.substr(silent + kSilent.size()));
-    if (last && said_s > sync::to_seconds(program.awake() - *last) + 0.1)
-      find(fmt::format("named: {} says '{}', but heard it {:.3f} s before", program.name(), text,
-                       sync::to_seconds(program.awake() - *last)));
+    if (run != runs_.end()) check_silence(program, *run, said_s);
   }
   const auto continued = continued_.find(program.name());
   if (continued == continued_.end() || timeline_.now() - continued->second > kQuietTime / 2 ||

@@ -48,7 +48,7 @@ void ServerProgram::start() {
     const bool is_ours =
         core_ && request.run_id() == core_->run_id() &&
         std::count(vehicle_ids_.begin(), vehicle_ids_.end(), request.vehicle_id()) > 0;
-    if (is_ours) flight_->on_request(request.action(), setting_.timeline.now());
+    if (is_ours) flight_->on_request(request.action());
     events_.push_back(request);
     wake_soon();
   });

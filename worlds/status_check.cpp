@@ -85,8 +85,8 @@ void StatusCheck::check_counter(const char* name, std::uint64_t said, std::uint6
 /// What the label must hold.
 std::string StatusCheck::describe_timing(std::uint64_t steps) const {
   if (sync_.mode == config::SyncMode::kRealtime)
-    return fmt::format("real-time, {} of {} late, worst age {:.4g} ms, ", held_ + fail_safe_,
-                       steps, static_cast<double>(worst_age_ * sync_.period_ns) * 1e-6);
+    return fmt::format("real-time, {} of {} late, worst age {:.4g} ms, ", held_ + fail_safe_, steps,
+                       static_cast<double>(worst_age_ * sync_.period_ns) * 1e-6);
   if (held_ + fail_safe_ == 0) return "exact";
   std::string text = "degraded: ";
   if (held_ > 0) text += fmt::format("{} steps held", held_);

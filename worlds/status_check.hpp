@@ -43,10 +43,10 @@ class StatusCheck {
   std::uint64_t step_ = 0;  // the last one published
   std::uint64_t resent_ = 0, held_ = 0, fail_safe_ = 0, changes_ = 0;
   std::uint64_t accepted_ = 0, answered_ = 0, flown_ = 0;  // steps of vehicles
-  std::uint64_t worst_age_ = 0;                  // of a held answer, steps
-  std::map<std::uint32_t, std::string> flyers_;  // the last ones, by vehicle
+  std::uint64_t worst_age_ = 0;                            // of a held answer, steps
+  std::map<std::uint32_t, std::string> flyers_;            // the last ones, by vehicle
   std::optional<SimStatus> last_;
-  Instant last_time_{0};  // awake time of the server
+  Instant last_time_{0};        // awake time of the server
   bool is_disturbed_ = false;   // since the last status
   bool was_disturbed_ = false;  // at any time
   bool is_over_ = false;

@@ -174,6 +174,9 @@ class World {
           clog_ = Instant(0);
           set_links();
         });
+      case Kind::kStall:
+        stalled_until_ = std::min(setting_.timeline.now() + fault.duration, plan_.healed);
+        return set_links();
       case Kind::kSlow:
         if (Program* program = current_[fault.target]) {
           program->set_slowness(sync::to_duration(fault.value));
@@ -241,6 +244,7 @@ class World {
         Link& link = setting_.network.link(hosts_[from], hosts_[to]);
         link.loss = is_healed ? 0 : std::max(plan_.link.loss, extra_loss_);
         link.packet_time = is_healed ? Instant(0) : std::max(plan_.link.packet_time, clog_);
+        link.stalled_until = stalled_until_;
         const bool was_cut = std::exchange(link.is_cut, !is_healed && cuts_[{from, to}] > 0);
         if (was_cut && !link.is_cut) link.mended = setting_.timeline.now();
       }
@@ -306,7 +310,8 @@ class World {
   int restarts_ = 0;
   std::uint64_t begun_faults_ = 0;
   double extra_loss_ = 0;
-  Instant clog_{0};               // time of a packet
+  Instant clog_{0};  // time of a packet
+  Instant stalled_until_{0};
   std::set<const Fault*> begun_;  // those of a step
   std::map<std::pair<std::size_t, std::size_t>, int> cuts_;
 };

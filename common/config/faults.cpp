@@ -133,6 +133,7 @@ void describe_effect(Map& map, Fault& fault, Kind kind) {
         if (action == Action::kStep) map.key(kRequired, "steps", fault.value, kSteps);
       });
     case Kind::kPartition:
+    case Kind::kStall:
       return lasts();
     case Kind::kClog:
       map.key(kRequired, "bandwidth_mbit", fault.value, kBandwidth);

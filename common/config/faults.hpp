@@ -48,8 +48,9 @@ enum class Kind {
   kRequest,
   kPartition,
   kClog,
+  kStall,
 };
-inline std::array<Name<Kind>, 13> names_of(Kind) {
+inline std::array<Name<Kind>, 14> names_of(Kind) {
   return {{{"kill", Kind::kKill},
            {"power-cut", Kind::kPowerCut},
            {"stop", Kind::kStop},
@@ -62,7 +63,8 @@ inline std::array<Name<Kind>, 13> names_of(Kind) {
            {"disk-full", Kind::kDiskFull},
            {"request", Kind::kRequest},
            {"partition", Kind::kPartition},
-           {"clog", Kind::kClog}}};
+           {"clog", Kind::kClog},
+           {"stall", Kind::kStall}}};
 }
 /// As ControlAction in idl/sls.idl.
 enum class Action { kStart, kPause, kStep, kResume, kReset, kStop };

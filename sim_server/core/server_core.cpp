@@ -248,8 +248,7 @@ void ServerCore::finish_step(sync::Time now) {
   const config::Sync& sync = parts_.scenario.sync;
   for (const auto& vehicle : parts_.fleet.vehicles()) {
     const model::AnswerKind kind = vehicle->record().kind;
-    const bool is_held =
-        kind == model::AnswerKind::kHeld || kind == model::AnswerKind::kFailSafe;
+    const bool is_held = kind == model::AnswerKind::kHeld || kind == model::AnswerKind::kFailSafe;
     sync::keep(kind == model::AnswerKind::kAccepted || (is_held && may_fly_without_answers(sync)),
                "each step is flown with an answer, unless the policy is hold or failsafe");
     parts_.report.series.timing.add(kind, vehicle->calc_age());
