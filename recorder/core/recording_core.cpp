@@ -53,7 +53,7 @@ void RecordingCore::on_status(const SimStatus& status) {
   last_status_ = status;
   // The server's history begins before this segment.
   const bool is_repeated = status.sample_index() < next_status_;
-  if (!is_repeated) note_status(status.sample_index());
+  note_status(status.sample_index());
   outputs_.add(status, is_repeated);
   note_whole();
 }

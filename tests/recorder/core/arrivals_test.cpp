@@ -63,8 +63,10 @@ TEST_F(ArrivalsTest, OnlyTheServerOfTheRunIsHeard) {
 
 TEST_F(ArrivalsTest, ARunThatWasOpenIsOver) {
   arrivals_.open(kRun, kItsServer);
-  arrivals_.open(kRun + 1, kItsServer);
   put(kRun, 0);
+  arrivals_.open(kRun + 1, kItsServer);
+  EXPECT_EQ(take(), Indices());
+  put(kRun, 1);
   arrivals_.open(kRun, kItsServer);
   EXPECT_EQ(take(), Indices());
 }

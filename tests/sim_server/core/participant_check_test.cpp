@@ -322,6 +322,7 @@ const Row kRows[] = {
      "members 1 | wrong-step 500 3 | wrong-step 500 4 | look 0 none | look 5000 none | "
      "wrong-step 500 5 | look 6000 " +
          kFoo + "sls/command: 3 answers rejected, none taken: step: expected 500, got 5"},
+    {"AnAnswerOfAnotherRunIsNotEarly", "members 1 | other-run 5 9 run=cd | look 0 none"},
     {"AnOldAnswerAfterAnotherMistakeIsOneMore",
      "members 1 | other-run 5 5 run=cd | wrong-step 500 3 | look 0 none | look 4000 " + kFoo +
          "sls/command: 2 answers rejected, none taken: step: expected 500, got 3"},
