@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -68,25 +69,31 @@ class Process {
 
   /// Does `action` now; when it is continued, if it is stopped; never if it has ended.
   template <class Action>
-  void run(Action&& action) {
+  void run(Action&& action, bool is_timer = false) {
     if (has_ended_) return;
     if (is_stopped_)
-      backlog_.emplace_back(std::forward<Action>(action));
+      backlog_.push_back({std::forward<Action>(action), is_timer});
     else
       action();
   }
+  /// The same at a time, as by a timer of its own.
   template <class Action>
   void run_at(Instant when, Action action) {
-    timeline_.at(when, [this, action = std::move(action)]() mutable { run(std::move(action)); });
+    timeline_.at(when,
+                 [this, action = std::move(action)]() mutable { run(std::move(action), true); });
   }
   /// A datagram arrives: the socket of a stopped process keeps the first ones.
   bool has_room() const { return !is_stopped_ || backlog_.size() < kMostBacklog; }
 
   void stop() { is_stopped_ = true; }
-  void go_on() {
+  /// `are_timers_first`: its own threads run before those that receive.
+  void go_on(bool are_timers_first = false) {
     is_stopped_ = false;
+    if (are_timers_first)
+      std::stable_partition(backlog_.begin(), backlog_.end(),
+                            [](const Waiting& waiting) { return waiting.is_timer; });
     while (!backlog_.empty() && !is_stopped_ && !has_ended_) {
-      const Timeline::Action action = std::move(backlog_.front());
+      const Timeline::Action action = std::move(backlog_.front().action);
       backlog_.pop_front();
       action();
     }
@@ -101,13 +108,18 @@ class Process {
  private:
   static constexpr std::size_t kMostBacklog = 400;
 
+  struct Waiting {
+    Timeline::Action action;
+    bool is_timer = false;
+  };
+
   Timeline& timeline_;
   Host& host_;
   const std::string name_;
   bool is_stopped_ = false;
   bool has_ended_ = false;
   bool was_killed_ = false;
-  std::deque<Timeline::Action> backlog_;
+  std::deque<Waiting> backlog_;
 };
 
 }  // namespace sls::worlds

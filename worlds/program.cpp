@@ -59,7 +59,7 @@ void Program::go_on() {
   if (stopped >= std::chrono::milliseconds(500)) stopped_ += stopped;
   setting_.properties.on_continued(*this);
   setting_.properties.on_disturbed(*this);
-  process_.go_on();
+  process_.go_on(setting_.timeline.now().count() / 1000 % 3 == 0);
 }
 
 void Program::exit(int code, std::string reason) {

@@ -387,9 +387,9 @@ TEST_F(ParticipantSeriesTest, AFloodOfCopiesIsNamed) {
     }
     play("look " + std::to_string(time_ms) + " " + expected);
   };
-  for (int i = 0; i < 20; ++i) answer_steps(20, i * 100, "none");  // of states that were sent again
+  for (int i = 0; i < 20; ++i) answer_steps(30, i * 100, "none");  // of states that were sent again
   for (int i = 0; i <= 40; ++i)
-    answer_steps(99, 2000 + i * 100,
+    answer_steps(31, 2000 + i * 100,
                  i < 40 ? "none"
                         : kFoo +
                               "sls/command: expected one answer to each state, got over 30 "

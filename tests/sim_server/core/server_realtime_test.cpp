@@ -229,6 +229,17 @@ TEST_F(ServerRealtimeTest, AWithdrawnLateEndLeavesTheNextOneItsWholeTime) {
   EXPECT_EQ(rig_.step(), 253u);
 }
 
+TEST_F(ServerRealtimeTest, TheThirdSlowAnswerInARowIsNamedIfASecondHasPassed) {
+  for (const std::uint64_t step : {0, 150, 300}) {
+    rig_.take_log();
+    rig_.wait_until(static_cast<std::int64_t>(step) * 4 + 3);
+    ServerRig::Answer slow{step};
+    slow.compute_ms = 200;
+    rig_.answer("pilot", slow);
+  }
+  EXPECT_NE(testing::PrintToString(rig_.take_log()).find("computes an answer"), std::string::npos);
+}
+
 TEST_F(ServerRealtimeTest, ALawThatTakesLongerThanAPeriodIsNamed) {
   for (std::uint64_t step = 0; step < 300; ++step) {
     rig_.wait_until(static_cast<std::int64_t>(step) * 4 + 3);
