@@ -295,6 +295,8 @@ const Row kRows[] = {
          kC +
          " (that of 'first'), got none; it is "
          "refused | admits 2: 2 | admits 2, 3 library=c: 2"},
+    {"ALibraryIsRefusedOnlyWhileAnotherOneBindsIt",
+     "members 2 | admits 1 library=c, 2: 1 | admits 2: 2 | look 0 none"},
     {"ALibraryBindsTheOthersOfItsVehicleIfItsClientCanFly",
      "admits 1 library=c vehicles=0, 2: 1 | admits 1 library=c vehicles=0, 2 vehicles=1: 1, 2 | "
      "admits 1 library=c vehicles=0 unready, 2 vehicles=0: 2 | "

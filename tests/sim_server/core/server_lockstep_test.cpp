@@ -251,6 +251,14 @@ TEST(ServerLockstepTest, AnAwaitedControllerIsNamedWithWhatIsKnownOfIt) {
                   rig.leave("pilot");
                 },
                 "1: waiting for: controller 'pilot' (gone) (9 s left)"},
+           Case{[](ServerRig& rig) {
+                  rig.show_controllers();
+                  ServerRig::Answer other;
+                  other.run_id = 1;
+                  rig.answer("pilot", other);
+                },
+                "0: waiting for: controller 'pilot' on box (1 of its answers rejected, none taken: "
+                "run_id: expected 00000000000001f4, got 0000000000000001) (9 s left)"},
            Case{[](ServerRig& rig) { rig.problem = "a mistake"; },
                 "0: waiting for: controller 'pilot' on box (9 s left); a mistake"},
        }) {
@@ -492,6 +500,7 @@ TEST(ServerLockstepTest, WhileTheFullQueueGetsShorterTheWaitGoesOn) {
   rig.is_queue_full = false;
   rig.wait(1);
   EXPECT_EQ(rig.step(), 1u);
+  EXPECT_EQ(rig.take_log().back(), "19000: step 1: the recorders are back");
   rig.is_queue_full = true;
   rig.answer("pilot", 1);
   rig.wait(10'002);

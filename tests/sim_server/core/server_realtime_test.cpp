@@ -45,6 +45,7 @@ TEST_F(ServerRealtimeTest, EachStateLeavesWhenItIsDue) {
   EXPECT_EQ(rig_.take_records(), (Lines{"0 accepted", "1 accepted", "2 accepted"}));
   rig_.wait_until(600);
   EXPECT_EQ(rig_.status().round_trip_p50_ns(), 1'000'000u);
+  EXPECT_NEAR(rig_.status().real_time_factor(), 1.0, 0.02);
 }
 
 TEST_F(ServerRealtimeTest, AnAnswerCountsUntilTheNextStateIsDue) {
