@@ -35,8 +35,10 @@ class FlightWatch {
               std::vector<std::uint32_t> vehicle_ids, const Program& server,
               std::function<void(std::string)> find);
 
-  /// The run before it, of the same server: participants that it knows announce themselves once.
-  void follow(const FlightWatch& before) { peers_ = before.peers_; }
+  /// A run before it, of the same server: participants that it knows announce themselves once.
+  void follow(const FlightWatch& before) {
+    peers_.insert(before.peers_.begin(), before.peers_.end());
+  }
 
   // --- arrives at the server ---
 
