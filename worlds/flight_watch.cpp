@@ -147,6 +147,14 @@ void FlightWatch::on_published(std::uint64_t step, Instant now) {
   is_disturbed_ = false;
 }
 
+/// The looks of a slow server count as stops.
+void FlightWatch::on_disturbed() {
+  is_disturbed_ = true;
+  disturbed_ = server_.awake();
+  for (auto& [vehicle, lacking] : lacking_) lacking.since = disturbed_;
+  status_.on_disturbed();
+}
+
 void FlightWatch::on_interrupted() { interrupted_ = server_.awake(); }
 
 /// The library of the first client decides who may fly, and the memory of a server.
@@ -204,9 +212,9 @@ void FlightWatch::on_running(Instant now) {
     if (awake - lacking.since > patience)
       return find_(fmt::format("gives-up: vehicle {} is flown without answers for {:.3f} s",
                                vehicle, sync::to_seconds(awake - lacking.since)));
-  if (awake - published_awake_ > patience)
-    find_(fmt::format("gives-up: step {} waits for {:.3f} s", step_,
-                      sync::to_seconds(awake - published_awake_)));
+  const Instant waited = awake - std::max(published_awake_, disturbed_);
+  if (waited > patience)
+    find_(fmt::format("gives-up: step {} waits for {:.3f} s", step_, sync::to_seconds(waited)));
 }
 
 /// A step ends when each vehicle has the answer that it awaits: another client's, if the stronger

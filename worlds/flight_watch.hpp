@@ -64,10 +64,7 @@ class FlightWatch {
   /// The server says `line`.
   void on_line(const std::string& line, Instant now);
   /// Its process was stopped or continued, or became slower or faster: it may be late with all.
-  void on_disturbed() {
-    is_disturbed_ = true;
-    status_.on_disturbed();
-  }
+  void on_disturbed();
 
  private:
   struct Client {
@@ -146,6 +143,7 @@ class FlightWatch {
   bool has_libraries_ = false;
   std::set<bus::PeerId> peers_;  // that announced themselves as controllers
   bool is_disturbed_ = false;    // since the last step was published
+  Instant disturbed_{0};         // the last time, awake time of the server
   StatusCheck status_;
   std::optional<std::pair<std::uint64_t, Instant>> schedule_;  // the first step and when it left
   Instant recorded_awake_{0};  // the last step, in awake time of the server
