@@ -191,6 +191,8 @@ TEST_F(RunControlTest, AnEndingRunAcceptsOnlyStopAndReset) {
 TEST_F(RunControlTest, TheEndOfARunAnswersOpenRequestsAndRefusesLaterOnes) {
   EXPECT_EQ(control.end(40, "mission finished"), std::nullopt);
   expect_refused(ask(ControlAction::ACTION_STOP), "the run has ended: mission finished");
+  control.end(51, "a later failure");
+  expect_refused(ask(ControlAction::ACTION_STOP), "the run has ended: mission finished");
   EXPECT_TRUE(control.holds());
   EXPECT_FALSE(control.is_stop_requested());
 }

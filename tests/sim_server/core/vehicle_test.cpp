@@ -51,6 +51,18 @@ class VehicleTest : public testing::Test {
   Vehicle vehicle_{scenario_, kRun, record_};
 };
 
+TEST_F(VehicleTest, TheRecordOfALateAnswerHoldsIt) {
+  const OfferedAnswer late = make_answer(3);
+  begin(5);
+  const model::StepRecord made = make_late_record(vehicle_, late);
+  EXPECT_EQ(made.kind, AnswerKind::kLate);
+  EXPECT_EQ(made.step, 3u);
+  EXPECT_EQ(made.answered_step, 3u);
+  EXPECT_EQ(made.client_name, "late");
+  EXPECT_EQ(made.answer.f_Q_W, late.answer.f_Q_W);
+  EXPECT_EQ(made.answer.stage, 7u);
+}
+
 TEST_F(VehicleTest, AnswersThatAreAllOnePeriodLateFlyItWithoutEnd) {
   fly(0, {});
   for (std::uint64_t step = 1; step < 4 * kHeldSteps; ++step) {
