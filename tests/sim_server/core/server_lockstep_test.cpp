@@ -533,6 +533,31 @@ TEST(ServerLockstepTest, ASilentRecorderThatIsBehindIsNamed) {
   EXPECT_EQ(count(), 1);
 }
 
+TEST(ServerLockstepTest, InAPauseNobodyIsSilent) {
+  auto scenario = with_recorder(config::RecorderPolicy::kWait);
+  scenario.sync.wait.controller = {config::ControllerPolicy::kWait, 10};
+  ServerRig rig(scenario);
+  rig.repeats_announcements = false;
+  rig.note_recorder("disk", -1);
+  rig.join("pilot");
+  rig.request(ControlAction::ACTION_PAUSE);
+  rig.answer("pilot", 0);
+  rig.fall_silent("disk");
+  rig.take_log();
+  rig.wait(1900);  // a recorder that is silent for longer is dead
+  EXPECT_EQ(rig.take_log(), Lines{});
+  rig.note_recorder("disk", 0);
+  rig.fall_silent("pilot");
+  rig.wait(5000);
+  rig.note_recorder("disk", 0);
+  rig.request(ControlAction::ACTION_RESUME);
+  rig.take_log();
+  rig.wait(1001);
+  EXPECT_EQ(rig.take_log(),
+            Lines{"7900: step 1: waiting for: controller 'pilot' on box (9 s left)"})
+      << "it could not answer";
+}
+
 // --- operator ------------------------------------------------------------------------------------
 
 TEST(ServerLockstepTest, APausedRunFliesTheStepsThatAreRequested) {
