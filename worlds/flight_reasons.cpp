@@ -7,8 +7,8 @@
 #include "worlds/flight_watch.hpp"
 #include "worlds/program.hpp"
 
-/// The reasons for which runs fail, judged by what has arrived at their servers: whoever is named
-/// as missing is missing, and was so for as long as the scenario says.
+/// Judges the reason of a failed run by what has arrived at its server. A participant that the
+/// reason names as missing must be missing, and for as long as the scenario says.
 namespace sls::worlds {
 namespace {
 
@@ -54,19 +54,7 @@ bool FlightWatch::on_failed(const std::string& reason, Instant now) {
   } else if (reason.rfind("not ready within ", 0) == 0) {
     check_start(reason, now);
   } else if (!waited.empty()) {
-    std::string named = find_behind(waited, " s for ");
-    named.resize(std::min(named.size(), named.find("; ")));  // a problem follows
-    const double deadline_s = std::stod(waited);
-    if (named.rfind("recorder", 0) == 0) {
-      if (is_lockstep()) check_early(reason, published_awake_, deadline_s);
-      if (holds(named, " expected, ") && count_recorders(now) >= sync_.wait_for.recorders)
-        find_("reason: " + reason + ", but they are there");
-    } else {
-      Instant since = published_awake_;
-      for (const auto& [vehicle, lacking] : lacking_) since = std::min(since, lacking.published);
-      if (refused.empty()) check_early(reason, since, deadline_s);
-      check_absence(reason, named, now);
-    }
+    check_wait(reason, waited, !refused.empty(), now);
   } else if (holds(reason, "the mission was finished, but ")) {
     check_absence(reason, reason, now);
   } else if (refused.empty()) {
@@ -79,6 +67,24 @@ bool FlightWatch::on_failed(const std::string& reason, Instant now) {
       find_("reason: " + reason + ", but its answer has no mistake");
   }
   return true;
+}
+
+/// `waited`: "1 s for controller 'a' on box; a problem". `is_refused`: an answer was refused.
+void FlightWatch::check_wait(const std::string& reason, const std::string& waited, bool is_refused,
+                             Instant now) {
+  std::string named = find_behind(waited, " s for ");
+  named.resize(std::min(named.size(), named.find("; ")));
+  const double deadline_s = std::stod(waited);
+  if (named.rfind("recorder", 0) == 0) {
+    if (is_lockstep()) check_early(reason, published_awake_, deadline_s);
+    if (holds(named, " expected, ") && count_recorders(now) >= sync_.wait_for.recorders)
+      find_("reason: " + reason + ", but they are there");
+    return;
+  }
+  Instant since = published_awake_;
+  for (const auto& [vehicle, lacking] : lacking_) since = std::min(since, lacking.published);
+  if (!is_refused) check_early(reason, since, deadline_s);
+  check_absence(reason, named, now);
 }
 
 /// Those that a line about the open step names are missing.

@@ -116,6 +116,8 @@ class FlightWatch {
   void check_due(std::uint64_t step, Instant now);
 
   void check_start(const std::string& reason, Instant now);
+  void check_wait(const std::string& reason, const std::string& waited, bool is_refused,
+                  Instant now);
   void check_absence(const std::string& reason, const std::string& named, Instant now);
   void check_early(const std::string& reason, Instant since, double deadline_s);
   bool is_there(const Client& client, Instant now) const;

@@ -394,17 +394,18 @@ void Properties::on_replied(const Program& server, std::uint64_t request_id,
 
 void Properties::on_stopped(const Program& program) { stopped_[program.name()] = timeline_.now(); }
 
-/// The server of `run` was silent for as long as `program` says.
-void Properties::check_silence(const Program& program,
-                               const std::pair<const std::uint64_t, Run>& run, double said_s) {
-  const auto heard = program.find_heard(run.first, run.second.server->id());
+/// A program says that run `run_id` is silent for `said_s`.
+void Properties::check_silence(const Program& program, std::uint64_t run_id, double said_s) {
+  const auto run = runs_.find(run_id);
+  if (run == runs_.end()) return;
+  const auto heard = program.find_heard(run_id, run->second.server->id());
   if (!heard) return;
   const double silent_s = sync::to_seconds(program.awake() - *heard);
   if (said_s > silent_s + 0.1)
     find(
         fmt::format("named: {} says that run {:016x} is silent for {:.1f} s, and heard it {:.3f} s "
                     "before",
-                    program.name(), run.first, said_s, silent_s));
+                    program.name(), run_id, said_s, silent_s));
 }
 
 /// A program that was stopped itself does not say that its server is silent, and no program says
@@ -414,16 +415,14 @@ void Properties::on_line(const Program& program, const std::string& text,
   for (auto& [run_id, run] : runs_)
     if (run.server == &program) run.flight->on_line(text, timeline_.now());
   static const std::string kServer = "server of run ", kSilent = "(silent for ";
-  const std::size_t named = text.find(kServer), silent = text.find(kSilent);
-  if (named != std::string::npos && silent != std::string::npos) {
-    const auto run = runs_.find(std::stoull(text.substr(named + kServer.size(), 16), nullptr, 16));
-    const double said_s = std::stod(text.substr(silent + kSilent.size()));
-    if (run != runs_.end()) check_silence(program, *run, said_s);
-  }
+  const std::size_t silent = text.find(kSilent);
+  if (silent == std::string::npos) return;
+  const std::size_t named = text.find(kServer);
+  if (named != std::string::npos)
+    check_silence(program, std::stoull(text.substr(named + kServer.size(), 16), nullptr, 16),
+                  std::stod(text.substr(silent + kSilent.size())));
   const auto continued = continued_.find(program.name());
-  if (continued == continued_.end() || timeline_.now() - continued->second > kQuietTime / 2 ||
-      text.find("(silent for ") == std::string::npos)
-    return;
+  if (continued == continued_.end() || timeline_.now() - continued->second > kQuietTime / 2) return;
   // A shorter stop counts as silence of the server, which does no harm.
   if (continued->second - stopped_.at(program.name()) < kQuietTime) return;
   const Host& host = program.process().host();

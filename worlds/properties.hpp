@@ -159,8 +159,7 @@ class Properties {
   void check_failure(const Program& server, const FlownScenario& flown);
   void check_exit(const Program& program);
   void check_client_end(const Program& client);
-  void check_silence(const Program& program, const std::pair<const std::uint64_t, Run>& run,
-                     double said_s);
+  void check_silence(const Program& program, std::uint64_t run_id, double said_s);
   void check_begin(std::uint64_t run_id, const Run& run, const FlownScenario& flown);
   void check_end(const Program& server, const std::vector<std::unique_ptr<Program>>& programs);
 

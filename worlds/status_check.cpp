@@ -68,7 +68,8 @@ void StatusCheck::on_status(const SimStatus& status) {
     find_(fmt::format("timing-label: expected '{}', got '{}'", describe_timing(flown_), timing));
   const bool has_round_trips = status.round_trip_p50_ns() > 0;
   const bool was_answered = !was_disturbed_ && flown_ > 0 && held_ + fail_safe_ == 0;
-  if (is_over_ && (was_answered > has_round_trips || has_round_trips > (accepted_ > 0)))
+  const bool lacks_them = was_answered && !has_round_trips;
+  if (is_over_ && (lacks_them || (has_round_trips && accepted_ == 0)))
     find_("status: round trips are said without answers, or not said with them");
   last_ = status;
   last_time_ = now;

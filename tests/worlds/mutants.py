@@ -204,7 +204,8 @@ def main():
     subprocess.run(["cmake", "-S", tree, "-B", folder / "build", "-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release",
                     "-DCMAKE_UNITY_BUILD=OFF", "-DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON",
                     "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", "-DSLS_BUILD_PROGRAMS=OFF",
-                    f"-DCMAKE_CXX_FLAGS=-D_GLIBCXX_ASSERTIONS -include {folder / 'switch.hpp'}", "-DCMAKE_CXX_FLAGS_RELEASE=-O1"],
+                    f"-DCMAKE_CXX_FLAGS=-D_GLIBCXX_ASSERTIONS -include {folder / 'switch.hpp'}",
+                    "-DCMAKE_CXX_FLAGS_RELEASE=-O1"],
                    check=True, stdout=subprocess.DEVNULL)
     run("ninja", "-C", folder / "build", "sls_idl")
     all_places = {}

@@ -10,9 +10,10 @@ namespace sls::sim {
 
 void RunReport::publish(RunPhase phase, const std::string& reason, sync::Time now) {
   const int before = has_published() ? sync::calc_progress(phase_) : 0;
-  sync::keep(before >= 0 ? sync::calc_progress(phase) < 0 || sync::calc_progress(phase) >= before
-                         : phase_ == RunPhase::PHASE_RESET && phase == RunPhase::PHASE_FAILED,
-             "a run never goes back to an earlier phase");
+  const int after = sync::calc_progress(phase);  // both are negative after the end
+  const bool goes_on = before >= 0 && (after < 0 || after >= before);
+  const bool is_failed_reset = phase_ == RunPhase::PHASE_RESET && phase == RunPhase::PHASE_FAILED;
+  sync::keep(goes_on || is_failed_reset, "a run never goes back to an earlier phase");
   phase_ = phase;
   SyncCounters counters = link;
   for (const auto& vehicle : fleet_.vehicles()) bus::add(counters, vehicle->gate.counters());
