@@ -11,7 +11,7 @@
 #include <csignal>
 #include <nlohmann/json.hpp>
 
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/stop_signal.hpp"
 
 namespace sls::bench {

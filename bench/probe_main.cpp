@@ -16,6 +16,7 @@
 #include "bench/hand_over.hpp"
 #include "closed_loop/flight.hpp"
 #include "closed_loop/flight_recorder.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/app/wait.hpp"

@@ -1,8 +1,8 @@
 #include "closed_loop/flight_recorder.hpp"
 
 #include "common/app/log.hpp"
-#include "common/app/options.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/app/version.hpp"
 #include "common/plugin/shared_library.hpp"
 #include "sim_server/messages.hpp"
 

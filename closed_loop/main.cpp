@@ -5,8 +5,10 @@
 
 #include "closed_loop/flight_recorder.hpp"
 #include "common/app/log.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/app/version.hpp"
 
 int main(int argc, char** argv) {
   using namespace sls;

@@ -6,7 +6,7 @@
 #include <cctype>
 
 #include "common/app/log.hpp"
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/scheduling.hpp"
 #include "common/app/wait.hpp"
 #include "common/bus/spinning.hpp"

@@ -12,8 +12,8 @@
 #include <nlohmann/json.hpp>
 #include <system_error>
 
-#include "common/app/options.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/app/version.hpp"
 #include "common/bus/names.hpp"
 #include "common/bus/node.hpp"
 #include "common/config/config_error.hpp"

@@ -3,7 +3,7 @@
 #include <chrono>
 
 #include "common/app/log.hpp"
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/scheduling.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/app/wait.hpp"

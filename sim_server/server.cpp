@@ -8,9 +8,9 @@
 
 #include "common/app/awake_clock.hpp"
 #include "common/app/log.hpp"
-#include "common/app/options.hpp"
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/app/version.hpp"
 #include "common/app/wait.hpp"
 #include "common/bus/spinning.hpp"
 #include "common/config/vehicle_ids.hpp"

@@ -11,8 +11,10 @@
 #include <thread>
 
 #include "common/app/log.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/app/version.hpp"
 #include "worlds/scenarios.hpp"
 #include "worlds/search.hpp"
 

@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 
+#include "common/app/version.hpp"
 #include "common/config/domain.hpp"
 
 namespace sls::app {
@@ -28,7 +29,5 @@ void add_common_options(CLI::App& cli, CommonOptions& options) {
       ->check(CLI::IsMember({"debug", "info", "warning", "error"}));
   cli.set_version_flag("--version", version());
 }
-
-std::string version() { return "sls " SLS_VERSION; }
 
 }  // namespace sls::app

@@ -18,7 +18,4 @@ struct CommonOptions {
 /// domain is that of `--domain`, else that of the environment variable SLS_DOMAIN, else 0.
 void add_common_options(CLI::App& cli, CommonOptions& options);
 
-/// "sls 0.1.0".
-std::string version();
-
 }  // namespace sls::app

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <functional>
-#include <stdexcept>
 #include <string>
 
 #include "common/app/options.hpp"
@@ -13,12 +12,6 @@ namespace sls::app {
 inline constexpr int kExitDone = 0;       ///< The work is done.
 inline constexpr int kExitRunFailed = 1;  ///< The run failed, or the comparison found a difference.
 inline constexpr int kExitBadUsage = 2;   ///< The command line or a file is wrong.
-
-/// The run failed: the mission was not finished, a peer was lost, data was lost. Exit code 1.
-class RunError : public std::runtime_error {
- public:
-  using std::runtime_error::runtime_error;
-};
 
 /// Parses the command line into `cli`, starts log and signal handling, calls `work` and returns the
 /// exit code: 0 without an exception, 2 for config::ConfigError, 1 for any other exception, 128 and

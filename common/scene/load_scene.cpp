@@ -1,5 +1,6 @@
 #include "common/scene/load_scene.hpp"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -20,10 +21,11 @@ Points sort_around(Points points) {
   for (Eigen::Index i = 0; i < count; ++i) offsets.col(i) = points[static_cast<std::size_t>(i)];
   const Eigen::Vector3d mean = offsets.rowwise().mean();
   offsets.colwise() -= mean;
-  const Eigen::Matrix3d axes =
-      Eigen::JacobiSVD<Eigen::Matrix3Xd>(offsets, Eigen::ComputeFullU).matrixU();
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;  // the normal of the plane first
+  axes.computeDirect(offsets * offsets.transpose());
   const auto calc_angle = [&](const Eigen::Vector3d& point) {
-    return math::atan2(axes.col(1).dot(point - mean), axes.col(0).dot(point - mean));
+    return math::atan2(axes.eigenvectors().col(1).dot(point - mean),
+                       axes.eigenvectors().col(2).dot(point - mean));
   };
   std::stable_sort(points.begin(), points.end(),
                    [&](const auto& a, const auto& b) { return calc_angle(a) < calc_angle(b); });

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "common/app/log.hpp"
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/config/model_keys.hpp"
 #include "common/config/vehicle_ids.hpp"

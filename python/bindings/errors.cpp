@@ -5,7 +5,7 @@
 #include <exception>
 #include <system_error>
 
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "common/config/config_error.hpp"
 #include "common/text/printable.hpp"
 #include "recorder/sinks/csv/csv_reader.hpp"

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "common/config/scenario.hpp"
 #include "python/bindings/bindings.hpp"
 #include "python/bindings/flight_table.hpp"

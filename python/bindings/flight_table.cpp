@@ -10,8 +10,8 @@
 #include <variant>
 
 #include "closed_loop/flight_certificate.hpp"
-#include "common/app/options.hpp"
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
+#include "common/app/version.hpp"
 #include "recorder/columns.hpp"
 #include "recorder/rows.hpp"
 #include "sim_server/messages.hpp"

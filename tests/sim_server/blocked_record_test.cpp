@@ -8,7 +8,7 @@
 #include <optional>
 #include <thread>
 
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "common/bus/qos_file.hpp"
 #include "common/bus/queued_writer.hpp"
 #include "common/config/vehicle_ids.hpp"

@@ -2,6 +2,7 @@
 
 #include "common/app/log.hpp"
 #include "common/app/run_main.hpp"
+#include "common/app/version.hpp"
 #include "tools/convert/conversion.hpp"
 
 int main(int argc, char** argv) {

@@ -2,6 +2,7 @@
 
 #include <iostream>
 
+#include "common/app/run_error.hpp"
 #include "common/app/run_main.hpp"
 #include "common/bus/end_process.hpp"
 #include "common/bus/node.hpp"

@@ -9,7 +9,7 @@
 #include <thread>
 
 #include "common/app/log.hpp"
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/bus/names.hpp"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/app/wait.hpp"
 #include "tools/ctl/screen.hpp"

@@ -2,8 +2,10 @@
 #include <optional>
 
 #include "closed_loop/delay_margin.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
+#include "common/app/version.hpp"
 #include "common/config/scenario.hpp"
 
 int main(int argc, char** argv) {

@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "common/app/log.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
 #include "common/bus/qos_file.hpp"

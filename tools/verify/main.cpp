@@ -1,7 +1,9 @@
 #include <spdlog/fmt/fmt.h>
 
 #include "common/app/log.hpp"
+#include "common/app/run_error.hpp"
 #include "common/app/run_main.hpp"
+#include "common/app/version.hpp"
 #include "recorder/verification.hpp"
 
 namespace {

@@ -1,5 +1,6 @@
 // Exit code and output on stderr and stdout of each outcome.
 #include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>

@@ -9,7 +9,7 @@
 #include <sstream>
 #include <thread>
 
-#include "common/app/run_main.hpp"
+#include "common/app/run_error.hpp"
 #include "tests/support/errors.hpp"
 #include "tests/support/own_domain.hpp"
 #include "tests/support/waiting.hpp"

@@ -4,7 +4,6 @@
 #include <array>
 #include <cstring>
 #include <limits>
-#include <regex>
 
 #include "common/bus/names.hpp"
 #include "common/bus/node.hpp"
@@ -44,10 +43,11 @@ std::array<double, 3> find_reference(const RecordEntry& entry, bool may_be_held)
 }
 
 std::vector<std::size_t> find_rotor_signals(const Parameters& parameters) {
-  static const std::regex kName("rotor_[0-9]+_rad_s");
   std::vector<std::size_t> found;
   for (std::size_t i = 0; i < parameters.signals().size(); ++i)
-    if (std::regex_match(parameters.signals()[i].name().to_string(), kName)) found.push_back(i);
+    if (parameters.signals()[i].name().to_string() ==
+        "rotor_" + std::to_string(found.size() + 1) + "_rad_s")
+      found.push_back(i);
   return found;
 }
 

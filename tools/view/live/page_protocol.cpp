@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "common/app/options.hpp"
+#include "common/app/version.hpp"
 #include "common/bus/names.hpp"
 #include "common/bus/sync_counters.hpp"
 #include "common/config/config_error.hpp"
