@@ -2,6 +2,7 @@
 // of single functions. Prints one line of JSON on stdout; timer and stamps print CSV. README.md.
 #include <sched.h>
 
+#include <CLI/CLI.hpp>
 #include <chrono>
 #include <cstdint>
 #include <cstdio>
@@ -135,8 +136,8 @@ std::vector<Stamp> listen_to_states(const app::CommonOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App cli("Measures what ./sls bench compares: see bench/README.md.");
-  cli.require_subcommand(1);
+  app::CommandLine cli("Measures what ./sls bench compares: see bench/README.md.");
+  cli.app().require_subcommand(1);
   app::CommonOptions options;
   options.qos_file = bus::default_qos_file();
   options.log_level = "warning";
@@ -147,7 +148,7 @@ int main(int argc, char** argv) {
   double seconds = 5.0;
 
   const auto add = [&](const char* name, const char* description) {
-    CLI::App* command = cli.add_subcommand(name, description);
+    CLI::App* command = cli.app().add_subcommand(name, description);
     app::add_common_options(*command, options);
     return command;
   };

@@ -8,26 +8,23 @@
 #include "common/app/run_error.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
-#include "common/app/version.hpp"
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli("Flies a scenario in one process without DDS, as fast as possible.");
+  app::CommandLine cli("Flies a scenario in one process without DDS, as fast as possible.");
   const app::CommonOptions options;  // no network here
   std::filesystem::path scenario_file, folder;
   std::optional<double> period_s;
   bool force = false;
   closed_loop::FlightOptions flight;
-  cli.set_version_flag("--version", app::version());
-  cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
+  cli.add_option("--scenario", scenario_file, "scenario (YAML)").type_name("FILE").required();
   cli.add_option("--out", folder, "folder of the recording, new or empty (default: no recording)")
-      ->type_name("DIR")
-      ->check(CLI::Validator(
-          [](const std::string& given) { return given.empty() ? "expected a folder, got ''" : ""; },
-          ""));
+      .type_name("DIR")
+      .check([](const std::string& given) {
+        return given.empty() ? "expected a folder, got ''" : "";
+      });
   cli.add_flag("--force", force, "replace an existing recording");
-  cli.add_option("--period-s", period_s, "control period (default: the scenario's)")
-      ->type_name("X");
+  cli.add_option("--period-s", period_s, "control period (default: the scenario's)").type_name("X");
   cli.add_flag(
       "--check-purity", flight.checks_purity,
       "compute every answer twice and refuse a law whose answers differ (default: only in the "

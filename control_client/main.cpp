@@ -15,22 +15,22 @@ constexpr const char* kIdentity = "controller";  // name of its keys on a secure
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli("Flies a scenario's mission: answers every state with a control force.");
+  app::CommandLine cli("Flies a scenario's mission: answers every state with a control force.");
   app::CommonOptions options;
   options.qos_file = bus::default_qos_file();
   std::filesystem::path scenario_file;
   std::string vehicles = "all";
   control::ClientOptions client;
-  app::add_common_options(cli, options);
+  cli.add_common_options(options);
   cli.add_option("--scenario", scenario_file, "scenario (YAML); must be the server's")
-      ->type_name("FILE")
-      ->required();
+      .type_name("FILE")
+      .required();
   cli.add_option("--strength", client.strength,
                  "of several clients for a vehicle, the one with the highest strength flies")
-      ->type_name("N");
+      .type_name("N");
   cli.add_option("--vehicles", vehicles,
                  "vehicles of the fleet to control, such as 0-9,20; all: the server's")
-      ->type_name("IDS");
+      .type_name("IDS");
   cli.add_flag("--follow", client.follows_servers,
                "continue with a server that replaces the first (default: exit with code 1)");
   cli.add_flag(
@@ -38,8 +38,8 @@ int main(int argc, char** argv) {
       "compute every answer twice and refuse a law whose answers differ (default: only in the "
       "first 100 steps)");
   cli.add_option("--name", client.name, "name of this client in recordings and messages")
-      ->check(CLI::Validator(&control::describe_name_defect, ""))
-      ->type_name("NAME");
+      .check(&control::describe_name_defect)
+      .type_name("NAME");
 
   const int code = app::run_main(argc, argv, cli, options, "control_client", [&] {
     const config::Scenario scenario = config::load_scenario(scenario_file);

@@ -19,30 +19,26 @@ constexpr const char* kIdentity = "recorder";  // name of its keys on a secured 
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli("Records every step of a run in CSV files.");
+  app::CommandLine cli("Records every step of a run in CSV files.");
   app::CommonOptions options;
   options.qos_file = bus::default_qos_file();
   record::RecorderOptions recorder;
   bool force = false;
   bool resume = false;
   bool check = false;
-  app::add_common_options(cli, options);
+  cli.add_common_options(options);
   cli.add_option("--out", recorder.folder, "folder of the recording, new or empty")
-      ->type_name("DIR")
-      ->required();
+      .type_name("DIR")
+      .required();
   cli.add_option("--vehicle", recorder.vehicle, "record the run of the server that flies vehicle N")
-      ->type_name("N");
-  auto* force_flag = cli.add_flag("--force", force, "replace an existing recording");
+      .type_name("N");
+  const auto force_flag = cli.add_flag("--force", force, "replace an existing recording");
   cli.add_flag("--resume", resume, "continue an unfinished recording, if there is one")
-      ->excludes(force_flag);
+      .excludes(force_flag);
   cli.add_flag("--follow", recorder.follow,
                "when another server replaces the first, record its run in a subfolder");
-  cli.add_flag_callback(
-      "--columns",
-      [] {
-        std::cout << record::describe_columns();
-        throw CLI::Success();
-      },
+  cli.add_print_flag(
+      "--columns", [] { std::cout << record::describe_columns(); },
       "print the columns of every file as Markdown and exit");
   cli.add_flag("--check", check, "check QoS file and folder and exit");
 

@@ -23,7 +23,8 @@ constexpr const char* kIdentity = "server";  // name of its keys on a secured do
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli("Simulates the vehicles of a scenario and publishes their states on DDS topics.");
+  app::CommandLine cli(
+      "Simulates the vehicles of a scenario and publishes their states on DDS topics.");
   app::CommonOptions options;
   options.qos_file = bus::default_qos_file();
   std::filesystem::path scenario_file;
@@ -33,22 +34,21 @@ int main(int argc, char** argv) {
   std::string vehicles = "all";
   std::size_t threads = std::max(1u, std::thread::hardware_concurrency());
   bool check = false;
-  app::add_common_options(cli, options);
-  cli.add_option("--scenario", scenario_file, "scenario (YAML)")->type_name("FILE")->required();
-  cli.add_option("--period-s", period_s, "control period (default: the scenario's)")
-      ->type_name("X");
+  cli.add_common_options(options);
+  cli.add_option("--scenario", scenario_file, "scenario (YAML)").type_name("FILE").required();
+  cli.add_option("--period-s", period_s, "control period (default: the scenario's)").type_name("X");
   cli.add_option("--mode", mode, "lockstep or realtime (default: the scenario's)")
-      ->type_name("MODE")
-      ->check(CLI::IsMember({"lockstep", "realtime"}));
+      .type_name("MODE")
+      .one_of({"lockstep", "realtime"});
   cli.add_option("--rtf", real_time_factor,
                  "real-time factor, realtime mode only (default: the scenario's)")
-      ->type_name("X");
+      .type_name("X");
   cli.add_option("--vehicles", vehicles, "vehicles of the fleet to simulate, such as 0-9,20")
-      ->type_name("IDS");
+      .type_name("IDS");
   cli.add_option("--threads", threads,
                  "threads that integrate vehicles (default: one per processor)")
-      ->type_name("N")
-      ->check(CLI::Range(1, 256));
+      .type_name("N")
+      .range(1, 256);
   cli.add_flag("--check", check, "check scenario and QoS file, print a summary and exit");
 
   const int code = app::run_main(argc, argv, cli, options, "sim_server", [&] {

@@ -14,7 +14,6 @@
 #include "common/app/run_error.hpp"
 #include "common/app/run_main.hpp"
 #include "common/app/stop_signal.hpp"
-#include "common/app/version.hpp"
 #include "worlds/scenarios.hpp"
 #include "worlds/search.hpp"
 
@@ -80,7 +79,8 @@ void print_story(const worlds::Plan& plan, const std::vector<worlds::FlownScenar
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App cli("Flies simulated worlds: server, clients and recorders with faults, from a seed.");
+  app::CommandLine cli(
+      "Flies simulated worlds: server, clients and recorders with faults, from a seed.");
   app::CommonOptions common;
   common.log_level = "error";  // the programs of a world write into its trace
   std::filesystem::path scenario, faults;
@@ -93,27 +93,27 @@ int main(int argc, char** argv) {
   cli.footer(
       "./sls worlds also takes --plot FILE (.png, .svg, .pdf): time and error of the flights over "
       "the loss.");
-  cli.set_version_flag("--version", app::version());
   cli.add_option(
          "--scenario", scenario,
          "scenario (YAML) that every world flies (default: 23 short ones, with both modes and "
          "all policies)")
-      ->type_name("FILE");
+      .type_name("FILE");
   cli.add_option("--faults", faults,
                  "link and faults (YAML, docs/faults.md) of every world, instead of drawn ones")
-      ->type_name("FILE");
-  cli.add_option("--seeds", seeds, "worlds to fly")->type_name("A-B");
+      .type_name("FILE");
+  cli.add_option("--seeds", seeds, "worlds to fly").type_name("A-B");
   cli.add_option("--jobs", options.jobs, "threads (default: one for each processor)")
-      ->check(CLI::Range(1, 256))
-      ->type_name("N");
+      .range(1, 256)
+      .type_name("N");
   cli.add_option("--most", options.most_failures, "end after so many failed worlds")
-      ->check(CLI::Range(1, 1000))
-      ->type_name("N");
+      .range(1, 1000)
+      .type_name("N");
   cli.add_option("--table", table, "write a CSV file with one row for each world")
-      ->type_name("FILE");
-  auto* replay = cli.add_option("--replay", replayed, "tell what happens in the world of this seed")
-                     ->type_name("SEED");
-  cli.add_flag("--verbose", is_verbose, "the whole world, with every status")->needs(replay);
+      .type_name("FILE");
+  const auto replay =
+      cli.add_option("--replay", replayed, "tell what happens in the world of this seed")
+          .type_name("SEED");
+  cli.add_flag("--verbose", is_verbose, "the whole world, with every status").needs(replay);
 
   return app::run_main(argc, argv, cli, common, "sls_worlds", [&] {
     parse_seeds(seeds, options);

@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cerrno>
 #include <exception>
@@ -155,11 +156,12 @@ std::string describe_failure(const std::exception& error) {
 
 }  // namespace
 
-int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
+int run_main(int argc, char** argv, CommandLine& command_line, const CommonOptions& options,
              const std::string& program, const std::function<void()>& work) {
   keep_standard_descriptors();
   start_log(program, "info");
   std::set_terminate(end_with_a_line);
+  CLI::App& cli = command_line.app();
   cli.name(program);
   try {
     cli.parse(argc, argv);

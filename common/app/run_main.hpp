@@ -4,7 +4,7 @@
 #include <functional>
 #include <string>
 
-#include "common/app/options.hpp"
+#include "common/app/command_line.hpp"
 
 namespace sls::app {
 
@@ -13,11 +13,11 @@ inline constexpr int kExitDone = 0;       ///< The work is done.
 inline constexpr int kExitRunFailed = 1;  ///< The run failed, or the comparison found a difference.
 inline constexpr int kExitBadUsage = 2;   ///< The command line or a file is wrong.
 
-/// Parses the command line into `cli`, starts log and signal handling, calls `work` and returns the
+/// Parses the command line by `cli`, starts log and signal handling, calls `work` and returns the
 /// exit code: 0 without an exception, 2 for config::ConfigError, 1 for any other exception, 128 and
 /// its number after a stop signal. An exception is printed as one line on stderr, also one of
 /// another thread, which ends the process at once.
-int run_main(int argc, char** argv, CLI::App& cli, const CommonOptions& options,
+int run_main(int argc, char** argv, CommandLine& cli, const CommonOptions& options,
              const std::string& program, const std::function<void()>& work);
 
 }  // namespace sls::app

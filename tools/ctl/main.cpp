@@ -36,10 +36,10 @@ void request(ctl::OperatorClient& client, ControlAction action, std::uint64_t st
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App cli("Controls a run and prints its status, from any machine on the domain.");
+  app::CommandLine cli("Controls a run and prints its status, from any machine on the domain.");
   ctl::Options options;
   options.common.qos_file = bus::default_qos_file();
-  ctl::add_options(cli, options);
+  ctl::add_options(cli.app(), options);
 
   const int code = app::run_main(argc, argv, cli, options.common, "sim_ctl", [&] {
     bus::Node node(options.common.qos_file, options.common.domain, "sim_ctl", kIdentity);

@@ -1,5 +1,6 @@
 #include "tools/ctl/options.hpp"
 
+#include <CLI/CLI.hpp>
 #include <charconv>
 #include <string>
 #include <system_error>

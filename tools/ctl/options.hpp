@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "common/app/options.hpp"
+#include "common/app/command_line.hpp"
 #include "common/bus/topics.hpp"
 
 namespace sls::ctl {

@@ -11,7 +11,7 @@
 
 int main(int argc, char** argv) {
   using namespace sls;
-  CLI::App cli(
+  app::CommandLine cli(
       "Finds out why data does not flow: sends datagrams and samples over each path and prints\n"
       "one line per check. Exit code 1: a check found a fault.");
   app::CommonOptions options;
@@ -19,21 +19,21 @@ int main(int argc, char** argv) {
   doctor::DoctorOptions examination;
   bool is_json = false, is_answering = false;
   int seconds = 60;
-  app::add_common_options(cli, options);
-  auto* peer = cli.add_option("--peer", examination.peer,
-                              "another machine, running the programs or sls_doctor --answer "
-                              "(default: this machine)")
-                   ->type_name("HOST");
+  cli.add_common_options(options);
+  const auto peer = cli.add_option("--peer", examination.peer,
+                                   "another machine, running the programs or sls_doctor --answer "
+                                   "(default: this machine)")
+                        .type_name("HOST");
   cli.add_option("--identity", examination.identity, "role whose keys to use on a secured domain")
-      ->type_name("NAME");
-  auto* json = cli.add_flag("--json", is_json, "print JSON");
-  auto* answer = cli.add_flag("--answer", is_answering, "answer the doctor of another machine")
-                     ->excludes(peer)
-                     ->excludes(json);
+      .type_name("NAME");
+  const auto json = cli.add_flag("--json", is_json, "print JSON");
+  const auto answer = cli.add_flag("--answer", is_answering, "answer the doctor of another machine")
+                          .excludes(peer)
+                          .excludes(json);
   cli.add_option("--for-s", seconds, "duration of --answer, s")
-      ->type_name("S")
-      ->check(CLI::Range(1, 3600))
-      ->needs(answer);
+      .type_name("S")
+      .range(1, 3600)
+      .needs(answer);
 
   return app::run_main(argc, argv, cli, options, "sls_doctor", [&] {
     examination.qos_file = options.qos_file;

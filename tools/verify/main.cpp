@@ -3,7 +3,6 @@
 #include "common/app/log.hpp"
 #include "common/app/run_error.hpp"
 #include "common/app/run_main.hpp"
-#include "common/app/version.hpp"
 #include "recorder/verification.hpp"
 
 namespace {
@@ -45,14 +44,13 @@ void verify_two(const OpenedRecording& a, const OpenedRecording& b) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App cli(
+  app::CommandLine cli(
       "Compares two recordings, or the files of one recording with its manifest.\n"
       "Exit codes: 0 equal; 1 different or damaged; 2 not a recording.");
   std::filesystem::path a, b;
-  cli.add_option("A", a, "folder of a recording")->type_name("DIR")->required();
+  cli.add_option("A", a, "folder of a recording").type_name("DIR").required();
   cli.add_option("B", b, "folder of a second recording (default: check A against its manifest)")
-      ->type_name("DIR");
-  cli.set_version_flag("--version", app::version());
+      .type_name("DIR");
   return app::run_main(argc, argv, cli, {}, "sls_verify", [&] {
     const OpenedRecording flight = record::open_recording(a);
     if (b.empty()) return verify_one(flight);

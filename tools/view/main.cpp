@@ -50,47 +50,46 @@ struct Options {
   void complete();
 };
 
-void add_options(CLI::App& cli, Options& options) {
-  app::add_common_options(cli, options.common);
+void add_options(app::CommandLine& cli, Options& options) {
+  cli.add_common_options(options.common);
   cli.add_option("DIR", options.recordings,
                  "one or two recordings to replay (default: the live flight on the domain)")
-      ->expected(0, 2)
-      ->type_name("")
-      ->default_str("");
+      .repeatable(0, 2)
+      .type_name("")
+      .no_default();
   cli.add_option("--recording", options.shown_recording,
                  "recording of the live flight, or a folder of recordings: a page opened late "
                  "gets from it what was flown before, at the end all (default: recordings)")
-      ->type_name("DIR")
-      ->default_str("");
+      .type_name("DIR")
+      .no_default();
   cli.add_option("--vehicle", options.vehicle_id, "watch the server that flies vehicle N")
-      ->type_name("N");
+      .type_name("N");
   cli.add_option("--listen", options.server.address,
                  "address to listen on; addresses other than loopback need --token-file")
-      ->type_name("ADDRESS");
+      .type_name("ADDRESS");
   cli.add_option("--port", options.server.port, "port to listen on; 0: any free port")
-      ->type_name("N")
-      ->check(CLI::Range(0, 65535));
+      .type_name("N")
+      .range(0, 65535);
   cli.add_option("--token-file", options.token_file,
                  "file whose first line is the token that enables a page's buttons")
-      ->type_name("FILE");
+      .type_name("FILE");
   cli.add_flag("--read-only", options.server.access.is_read_only, "show no buttons on any page");
   cli.add_option("--allow-origin", options.server.access.allowed_origins,
                  "other origin whose pages may connect, and operate with the token, such as "
                  "https://app.foxglove.dev; repeatable")
-      ->type_name("URL")
-      ->expected(1)
-      ->multi_option_policy(CLI::MultiOptionPolicy::TakeAll)
-      ->default_str("");
+      .type_name("URL")
+      .repeatable(1, 1)
+      .no_default();
   cli.add_flag("--ros", options.has_ros_face, "also publish the flight on ROS 2 topics");
   cli.add_option("--identity", options.identity,
                  "role whose keys to use on a secured domain; operator enables buttons")
-      ->type_name("NAME");
+      .type_name("NAME");
   cli.add_option("--export", options.export_file,
                  "write a page that contains the recordings to FILE and exit")
-      ->type_name("FILE");
+      .type_name("FILE");
   cli.add_option("--most-bytes", options.most_bytes,
                  "largest size of the file of --export; steps are left out to fit")
-      ->type_name("N");
+      .type_name("N");
 }
 
 void Options::complete() {
@@ -206,7 +205,7 @@ void run_checked(const Options& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App cli(
+  app::CommandLine cli(
       "Shows a live or recorded flight in the browser, and a live one in Foxglove and ROS 2.");
   Options options;
   options.common.qos_file = bus::default_qos_file();

@@ -7,6 +7,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <CLI/CLI.hpp>
 #include <cerrno>
 #include <csignal>
 #include <cstdlib>
@@ -33,15 +34,15 @@ Outcome run(
     std::vector<std::string> arguments, const std::function<void()>& work = [] {}) {
   Outcome outcome;
   outcome.options.qos_file = "/somewhere/default.xml";
-  CLI::App cli("Does something.");
-  add_common_options(cli, outcome.options);
+  CommandLine cli("Does something.");
+  cli.add_common_options(outcome.options);
   std::string needed = "value";
-  cli.add_option("--needed", needed, "its own option")->type_name("TEXT");
+  cli.add_option("--needed", needed, "its own option").type_name("TEXT");
   double number = 0.0;
-  cli.add_option("--number", number,
-                 "a number with a meaning that does not fit into one line of a terminal");
-  cli.add_subcommand("pause");
-  cli.add_subcommand("resume");
+  cli.app().add_option("--number", number,
+                       "a number with a meaning that does not fit into one line of a terminal");
+  cli.app().add_subcommand("pause");
+  cli.app().add_subcommand("resume");
   arguments.insert(arguments.begin(), "program");
   std::vector<char*> argv;
   for (std::string& argument : arguments) argv.push_back(argument.data());
