@@ -1,6 +1,5 @@
 // Exit code and output on stderr and stdout of each outcome.
 #include "common/app/run_main.hpp"
-#include "common/app/run_error.hpp"
 
 #include <fcntl.h>
 #include <gtest/gtest.h>
@@ -17,6 +16,8 @@
 #include <thread>
 #include <vector>
 
+#include "common/app/run_error.hpp"
+#include "common/app/version.hpp"
 #include "common/config/config_error.hpp"
 
 namespace sls::app {
@@ -206,7 +207,7 @@ class RunMainDeathTest : public testing::Test {
 void run_and_exit(const std::function<void()>& work) {
   char name[] = "program";
   char* argv[] = {name};
-  CLI::App cli;
+  CommandLine cli("Does something.");
   std::exit(run_main(1, argv, cli, {}, "program", work));
 }
 
