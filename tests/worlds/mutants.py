@@ -1,7 +1,7 @@
 """Makes defects in the cores by rule, and says which the scripts of the cores and the worlds find: `./sls mutants`.
 
-Clang names the places: each comparison, condition, operand of && and ||, constant, assignment to a member, and call that
-only acts. One build holds all defects; the variable SLS_MUTANT switches one on. The table is printed as Markdown."""
+Clang names the places: each comparison, condition, operand of && and ||, constant, message, assignment to a member, and
+call that only acts. One build holds all defects; the variable SLS_MUTANT switches one on. The table is printed as Markdown."""
 
 import argparse
 import json
@@ -24,6 +24,7 @@ SWITCH = """#pragma once
 namespace sls_mutants {
 inline const int active = [] { const char* text = std::getenv("SLS_MUTANT"); return text ? std::atoi(text) : -1; }();
 inline bool on(int id) { return id == active; }
+inline const char* text(int id, const char* text) { return on(id) ? "another text" : text; }
 template <class T> auto twice(int id, T value) { return on(id) ? static_cast<T>(value + value) : value; }
 """
 
@@ -74,6 +75,8 @@ def find_places(clang, file, arguments, places_of):
                 note_statement(place, cursor, begin, end)
             if cursor.kind == kinds.DECL_REF_EXPR and re.match(r"k[A-Z]", cursor.spelling) and is_number(cursor):
                 place.add("twice", begin, end, [(begin, "::sls_mutants::twice({}, "), (end, ")")])
+            if cursor.kind == kinds.STRING_LITERAL and b" " in place.text[begin:end]:
+                place.add("text", begin, end, [(begin, "::sls_mutants::text({}, "), (end, ")")])
         if cursor.kind in (kinds.CASE_STMT, kinds.STATIC_ASSERT) or "constexpr" in first_tokens(cursor):
             return
         is_body = cursor.kind == kinds.COMPOUND_STMT

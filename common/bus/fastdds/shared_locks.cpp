@@ -1,4 +1,4 @@
-/// Replaces five functions of the C library in the programs that link this file (sim_server,
+/// Replaces six functions of the C library in the programs that link this file (sim_server,
 /// control_client, recorder). These programs then keep working when another process is killed or
 /// stopped while it holds a lock in shared memory.
 ///
@@ -17,7 +17,10 @@
 ///   holder is stopped, and a reader looks for data ten times a second;
 /// - a reader waits for the locks of its own port without a time limit, because the library ends
 ///   the process of a reader that gives up after 1 s. But a process that closes its ports goes on
-///   without a lock whose holder is stopped, because nothing reads these ports any more.
+///   without a lock whose holder is stopped, because nothing reads these ports any more;
+/// - a writer wakes a reader after it has released the lock that the reader wants next. Fast DDS
+///   posts the semaphore inside the lock: a reader on the same processor then runs at once, finds
+///   the lock taken, sleeps, and is woken a second time (trap 47).
 ///
 /// Upstream: #5469 (open) has the symptom; no issue names the locks. To be deleted when the mutexes
 /// of ports are robust and a reader does not rely on being woken; tests/system/shared_lock_test.cpp
@@ -106,6 +109,15 @@ int take_over(int result, pthread_mutex_t* mutex) {
 /// twice when it replaces the port of a process that was killed inside a message (#6484).
 thread_local const pthread_mutex_t* held = nullptr;
 thread_local bool is_held_twice = false;
+
+/// The locks between processes that this thread holds, and the readers to wake when it holds none.
+/// A process that dies before it has woken them delays them until they look by themselves.
+struct Waking {
+  int locks = 0;
+  std::atomic<std::size_t> count{0};
+  std::array<sem_t*, 8> semaphores;
+};
+thread_local Waking waking;
 
 /// A few locks that this thread remembers, the latest ones.
 class Locks {
@@ -231,6 +243,18 @@ int lock_other(decltype(pthread_mutex_timedlock)* lock_until, pthread_mutex_t* m
   return ETIMEDOUT;
 }
 
+int post(sem_t* semaphore) noexcept {
+  static const auto next = find_next(&sem_post, "sem_post");
+  return next(semaphore);
+}
+
+void release() noexcept {
+  if (waking.locks > 0) --waking.locks;  // 0: taken by a function that is not ours
+  if (waking.locks > 0) return;
+  const std::size_t count = waking.count.exchange(0, std::memory_order_relaxed);
+  for (std::size_t i = 0; i < count; ++i) post(waking.semaphores[i]);
+}
+
 [[maybe_unused]] const bool is_linked = can_share_data = true;
 
 }  // namespace
@@ -260,7 +284,10 @@ int pthread_mutex_timedlock(pthread_mutex_t* mutex, const timespec* deadline) no
     return 0;
   }
   const int result = is_own(mutex) ? lock_own(next, mutex) : lock_other(next, mutex, *deadline);
-  if (result == 0 && !forgone.hold(mutex)) held = mutex;
+  if (result == 0 && !forgone.hold(mutex)) {
+    held = mutex;
+    ++waking.locks;
+  }
   return result;
 }
 
@@ -274,8 +301,22 @@ int pthread_mutex_unlock(pthread_mutex_t* mutex) noexcept {
     held = nullptr;
   }
   const int result = next(mutex);
+  release();
   // EPERM: this process went on without the lock. boost::interprocess would end the process.
   return result == EPERM && is_leaving.load(std::memory_order_relaxed) ? 0 : result;
+}
+
+int sem_post(sem_t* semaphore) noexcept {
+  using namespace sls::bus;
+  if (waking.locks == 0) return post(semaphore);
+  // A signal handler may post between any two instructions of this function.
+  const std::size_t place = waking.count.fetch_add(1, std::memory_order_relaxed);
+  if (place < waking.semaphores.size()) {
+    waking.semaphores[place] = semaphore;
+    return 0;
+  }
+  waking.count.fetch_sub(1, std::memory_order_relaxed);
+  return post(semaphore);
 }
 
 int sem_timedwait(sem_t* semaphore, const timespec* deadline) {

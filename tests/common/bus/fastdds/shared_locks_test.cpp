@@ -12,6 +12,7 @@
 #include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <csignal>
 #include <ctime>
 #include <string>
 #include <thread>
@@ -229,6 +230,57 @@ TEST_F(SharedLocksTest, AReaderLooksAtItsPortBeforeItsTime) {
   const auto start = Clock::now();
   EXPECT_EQ(wait_within(kLong_s), ETIMEDOUT);
   EXPECT_LT(seconds_since(start), kSlow_s);
+}
+
+int count(sem_t& semaphore) {
+  int value = -1;
+  sem_getvalue(&semaphore, &value);
+  return value;
+}
+
+TEST_F(SharedLocksTest, AReaderIsWokenWhenTheWriterHasReleasedItsLastLock) {
+  pthread_mutex_t inner;
+  pthread_mutexattr_t attributes;
+  pthread_mutexattr_init(&attributes);
+  pthread_mutexattr_setpshared(&attributes, PTHREAD_PROCESS_SHARED);
+  pthread_mutex_init(&inner, &attributes);
+  ASSERT_EQ(lock_within(kLong_s), 0);
+  const timespec deadline = after(kLong_s);
+  ASSERT_EQ(pthread_mutex_timedlock(&inner, &deadline), 0);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(sem_post(&port_->semaphore), 0);
+  pthread_mutex_unlock(&inner);
+  EXPECT_EQ(count(port_->semaphore), 0);
+  pthread_mutex_unlock(&port_->mutex);
+  EXPECT_EQ(count(port_->semaphore), 3);
+  sem_post(&port_->semaphore);  // without a lock
+  EXPECT_EQ(count(port_->semaphore), 4);
+}
+
+TEST_F(SharedLocksTest, NoWakingIsLostHoweverManyThereAre) {
+  ASSERT_EQ(lock_within(kLong_s), 0);
+  for (int i = 0; i < 50; ++i) sem_post(&port_->semaphore);
+  pthread_mutex_unlock(&port_->mutex);
+  EXPECT_EQ(count(port_->semaphore), 50);
+}
+
+TEST_F(SharedLocksTest, ASignalHandlerMayWakeAReaderToo) {
+  static sem_t* semaphore = nullptr;
+  semaphore = &port_->semaphore;
+  const auto before = std::signal(SIGUSR1, [](int) { sem_post(semaphore); });
+  ASSERT_EQ(lock_within(kLong_s), 0);
+  raise(SIGUSR1);
+  sem_post(semaphore);
+  pthread_mutex_unlock(&port_->mutex);
+  raise(SIGUSR1);
+  std::signal(SIGUSR1, before);
+  EXPECT_EQ(count(port_->semaphore), 3);
+}
+
+TEST_F(SharedLocksTest, AThreadThatWaitsForALockInVainWakesReaders) {
+  start_holder(SIGSTOP);
+  EXPECT_EQ(lock_within(kSlow_s), ETIMEDOUT);
+  sem_post(&port_->semaphore);
+  EXPECT_EQ(count(port_->semaphore), 1);
 }
 
 TEST_F(SharedLocksTest, AWaitForANamedSemaphoreIsNotCutShort) {
