@@ -38,6 +38,9 @@ constexpr Instant kLastAttempts = 1s;
 /// A server waits longer than this for recorders that do not get on.
 constexpr Instant kWaitsFor = 5s;
 
+/// A recorder announces new steps after 20 ms; the rest is for slow processors.
+constexpr Instant kSaidWithin = 400ms;
+
 /// A server waits at most 1 s for acknowledgements of each of two topics.
 constexpr Instant kEndsWithin = 3500ms;
 
@@ -377,6 +380,12 @@ void Properties::on_progress(const Program& recorder, std::int64_t step,
                        recorder.name(), step, last, vehicle));
 }
 
+void Properties::on_unsaid(const Program& recorder, Instant since) {
+  if (since > kSaidWithin)
+    find(fmt::format("progress: {} has further steps for {:.3f} s, and does not say so",
+                     recorder.name(), sync::to_seconds(since)));
+}
+
 /// A server leaves requests for the runs of others to them.
 void Properties::on_replied(const Program& server, std::uint64_t request_id,
                             const Network& network) {
@@ -531,6 +540,7 @@ void Properties::check_recording(const Program& program, const StoredRecording& 
                             program.name(), recording.run_id));
   const Run& run = found->second;
   check_rows(program, recording, run);
+  if (recording.phase) check_claims(program, recording);
   for (const std::string& damage : recording.damages)
     find(fmt::format("disk: {}: {}", program.name(), damage));
   if (promise == Promise::kCalm && run.has_ended && recording.claims.outcome == "failed")
@@ -600,6 +610,33 @@ void Properties::check_rows(const Program& program, const StoredRecording& recor
                         "listed as missing",
                         program.name(), next, vehicle));
   }
+}
+
+/// The outcome and the missing statuses are those of what came to be written.
+void Properties::check_claims(const Program& program, const StoredRecording& recording) {
+  const record::Claims& claims = recording.claims;
+  const std::string phase = bus::to_string(*recording.phase);
+  const bool knows_end = phase == "finished" || phase == "failed" || phase == "reset";
+  const bool says_end = claims.outcome == "finished" || claims.outcome == "failed";
+  const bool is_right = !recording.is_closed
+                            ? claims.outcome.empty() || claims.outcome == "recording"
+                        : knows_end ? claims.outcome == phase
+                                    : !says_end && claims.outcome != "recording";
+  if (!is_right)
+    find(fmt::format("outcome: {} says '{}' {} its end, and the last phase it heard is {}",
+                     program.name(), claims.outcome, recording.is_closed ? "after" : "before",
+                     phase));
+  if (!recording.is_closed || claims.missing.further_gaps > 0) return;
+  std::set<std::uint64_t> all = recording.statuses;
+  for (const record::MissingSteps& gap : claims.missing.listed)
+    if (gap.topic == "sls/status")
+      for (std::uint64_t index = gap.from; index <= gap.to; ++index)
+        if (!all.insert(index).second)
+          return find(fmt::format("rows: {}: status {} is there and listed as missing",
+                                  program.name(), index));
+  if (all.size() != *all.rbegin() + 1)
+    find(fmt::format("rows: {}: of {} statuses {} are there or listed as missing", program.name(),
+                     *all.rbegin() + 1, all.size()));
 }
 
 /// A server ends soon after the recorders of its finished run, and not before them.

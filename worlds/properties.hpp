@@ -38,6 +38,9 @@ struct StoredRecording {
   std::string certificate;             ///< of a closed one
   std::vector<std::string> damages;    ///< where files are no rows, or other than the manifest says
   std::map<std::uint32_t, Rows> rows;  ///< by vehicle
+  // What came to be written; only of a recorder without a folder.
+  std::set<std::uint64_t> statuses;  ///< their indices
+  std::optional<RunPhase> phase;     ///< of the last status
 };
 
 /// The course of a finished flight.
@@ -82,6 +85,8 @@ class Properties {
   /// `step`: the last complete one, as announced; `newest`: the last one received, by vehicle.
   void on_progress(const Program& recorder, std::int64_t step,
                    const std::map<std::uint32_t, std::int64_t>& newest);
+  /// The recorder has written more than it has said, for so long.
+  void on_unsaid(const Program& recorder, Instant since);
   void on_replied(const Program& server, std::uint64_t request_id, const Network& network);
   void on_interrupted(const Program& program);
   void on_killed(const Program& program);
@@ -156,6 +161,7 @@ class Properties {
   /// All rows of the run are there.
   void check_whole(const Program& program, const StoredRecording& recording, const Run& run);
   void check_rows(const Program& program, const StoredRecording& recording, const Run& run);
+  void check_claims(const Program& program, const StoredRecording& recording);
   void check_failure(const Program& server, const FlownScenario& flown);
   void check_exit(const Program& program);
   void check_client_end(const Program& client);

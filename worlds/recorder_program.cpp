@@ -150,6 +150,8 @@ void RecorderProgram::announce_progress() {
   const std::int64_t progress = writing_ ? writing_->last_complete_step() : -1;
   if (progress > first_progress_) setting_.properties.on_progress(*this, progress, newest_);
   announce(core_->make_announcement(progress, !failure_.empty()));
+  said_ = progress;
+  unsaid_since_.reset();
 }
 
 // --- the writing thread --------------------------------------------------------------------------
@@ -195,10 +197,20 @@ bool RecorderProgram::write_samples() {
     if (const auto* batch = std::get_if<RecordBatch>(&sample)) {
       note_newest(*batch);
       writing_->add(*batch, now());
-    } else
-      writing_->add(std::get<SimStatus>(sample));
+    } else {
+      const auto& status = std::get<SimStatus>(sample);
+      writing_->add(status);
+      if (options_.folder.empty() && status.run_id() == recordings_.back().run_id) {
+        recordings_.back().statuses.insert(status.sample_index());
+        recordings_.back().phase = status.phase();
+      }
+    }
   }
   writing_->on_time(now());
+  if (writing_->last_complete_step() > said_) {
+    if (!unsaid_since_) unsaid_since_ = awake();
+    setting_.properties.on_unsaid(*this, awake() - *unsaid_since_);
+  }
   if (writing_->is_whole() || must_close) {
     recorded_ = writing_->close(must_close_.value_or(record::RunWatch::End()), arrivals_.refused());
     has_closed_ = true;
