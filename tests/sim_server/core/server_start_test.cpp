@@ -22,6 +22,7 @@ TEST(ServerStartTest, OnThisMachineTheClaimTakesAQuarterOfASecond) {
   rig.wait_until(250);
   EXPECT_EQ(rig.phase(), Phase::kGathering);
   EXPECT_EQ(rig.status().phase(), RunPhase::PHASE_WAITING);
+  EXPECT_EQ(rig.status().reason().to_string(), "participants are not ready");
 }
 
 TEST(ServerStartTest, OnANetworkOrWithAnUnheardClaimItTakesOneSecond) {
