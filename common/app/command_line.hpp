@@ -1,6 +1,5 @@
-/// The command line of a program. CLI11 reads it; its header is included by command_line.cpp, and
-/// by those that need more of it, because each file that includes it takes seconds longer to
-/// compile.
+/// The command line of a program, read by CLI11. Only files that need more than this include its
+/// header, which takes seconds to compile.
 #pragma once
 
 #include <filesystem>
