@@ -21,8 +21,8 @@ Points sort_around(Points points) {
   for (Eigen::Index i = 0; i < count; ++i) offsets.col(i) = points[static_cast<std::size_t>(i)];
   const Eigen::Vector3d mean = offsets.rowwise().mean();
   offsets.colwise() -= mean;
-  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes;  // the normal of the plane first
-  axes.computeDirect(offsets * offsets.transpose());
+  // The normal of the plane comes first. Not computeDirect, which calls the C library's atan2.
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(offsets * offsets.transpose());
   const auto calc_angle = [&](const Eigen::Vector3d& point) {
     return math::atan2(axes.eigenvectors().col(1).dot(point - mean),
                        axes.eigenvectors().col(2).dot(point - mean));
