@@ -38,9 +38,6 @@ constexpr Instant kLastAttempts = 1s;
 /// A server waits longer than this for recorders that do not get on.
 constexpr Instant kWaitsFor = 5s;
 
-/// A recorder announces new steps after 20 ms; the rest is for slow processors.
-constexpr Instant kSaidWithin = 400ms;
-
 /// A server waits at most 1 s for acknowledgements of each of two topics.
 constexpr Instant kEndsWithin = 3500ms;
 
@@ -378,12 +375,6 @@ void Properties::on_progress(const Program& recorder, std::int64_t step,
     if (last < step)
       find(fmt::format("progress: {} says step {}, and has none after {} of vehicle {}",
                        recorder.name(), step, last, vehicle));
-}
-
-void Properties::on_unsaid(const Program& recorder, Instant since) {
-  if (since > kSaidWithin)
-    find(fmt::format("progress: {} has further steps for {:.3f} s, and does not say so",
-                     recorder.name(), sync::to_seconds(since)));
 }
 
 /// A server leaves requests for the runs of others to them.

@@ -85,8 +85,6 @@ class Properties {
   /// `step`: the last complete one, as announced; `newest`: the last one received, by vehicle.
   void on_progress(const Program& recorder, std::int64_t step,
                    const std::map<std::uint32_t, std::int64_t>& newest);
-  /// The recorder has written more than it has said, for so long.
-  void on_unsaid(const Program& recorder, Instant since);
   void on_replied(const Program& server, std::uint64_t request_id, const Network& network);
   void on_interrupted(const Program& program);
   void on_killed(const Program& program);

@@ -150,8 +150,6 @@ void RecorderProgram::announce_progress() {
   const std::int64_t progress = writing_ ? writing_->last_complete_step() : -1;
   if (progress > first_progress_) setting_.properties.on_progress(*this, progress, newest_);
   announce(core_->make_announcement(progress, !failure_.empty()));
-  said_ = progress;
-  unsaid_since_.reset();
 }
 
 // --- the writing thread --------------------------------------------------------------------------
@@ -207,10 +205,6 @@ bool RecorderProgram::write_samples() {
     }
   }
   writing_->on_time(now());
-  if (writing_->last_complete_step() > said_) {
-    if (!unsaid_since_) unsaid_since_ = awake();
-    setting_.properties.on_unsaid(*this, awake() - *unsaid_since_);
-  }
   if (writing_->is_whole() || must_close) {
     recorded_ = writing_->close(must_close_.value_or(record::RunWatch::End()), arrivals_.refused());
     has_closed_ = true;

@@ -62,8 +62,6 @@ class RecorderProgram : public Program {
 
   std::unique_ptr<WorldRecording> writing_;       // of the run that is recorded
   std::int64_t first_progress_ = -1;              // of this run, when the recording was opened
-  std::int64_t said_ = -1;                        // progress in the last announcement
-  std::optional<Instant> unsaid_since_;           // there is more
   std::map<std::uint32_t, std::int64_t> newest_;  // step that came to be written, by vehicle
   std::optional<record::RunWatch::End> must_close_;
   bool has_recorded_ = false;
