@@ -49,6 +49,18 @@ void mix_vector(std::uint64_t& hash, const Eigen::Vector3d& vector) {
   }
 }
 
+/// The outcome of a recording, or the phase of a run, that says how the run ended.
+bool is_end(const std::string& outcome) {
+  return outcome == "finished" || outcome == "failed" || outcome == "reset";
+}
+
+/// `phase`: of the last status that came to be written.
+bool may_claim(const std::string& outcome, bool is_closed, const std::string& phase) {
+  if (!is_closed) return outcome.empty() || outcome == "recording";
+  if (is_end(phase)) return outcome == phase;
+  return outcome != "finished" && outcome != "failed" && outcome != "recording";
+}
+
 /// A program that comes after the flight finds nothing.
 bool has_joined(const Program& program) {
   if (program.role() == Role::kClient)
@@ -591,7 +603,7 @@ void Properties::check_rows(const Program& program, const StoredRecording& recor
       next = step + 1;
     }
     const std::string& outcome = recording.claims.outcome;
-    const bool knows_end = outcome == "finished" || outcome == "failed" || outcome == "reset";
+    const bool knows_end = is_end(outcome);
     // The last step of a failed run need not be listed: it is not always published.
     const std::uint64_t end = recording.claims.last_step + (outcome == "finished" ? 1 : 0);
     for (; lists_all && knows_end && next < end; ++next)
@@ -607,13 +619,7 @@ void Properties::check_rows(const Program& program, const StoredRecording& recor
 void Properties::check_claims(const Program& program, const StoredRecording& recording) {
   const record::Claims& claims = recording.claims;
   const std::string phase = bus::to_string(*recording.phase);
-  const bool knows_end = phase == "finished" || phase == "failed" || phase == "reset";
-  const bool says_end = claims.outcome == "finished" || claims.outcome == "failed";
-  const bool is_right = !recording.is_closed
-                            ? claims.outcome.empty() || claims.outcome == "recording"
-                        : knows_end ? claims.outcome == phase
-                                    : !says_end && claims.outcome != "recording";
-  if (!is_right)
+  if (!may_claim(claims.outcome, recording.is_closed, phase))
     find(fmt::format("outcome: {} says '{}' {} its end, and the last phase it heard is {}",
                      program.name(), claims.outcome, recording.is_closed ? "after" : "before",
                      phase));

@@ -1,9 +1,10 @@
-/// The command line of a program, read by CLI11. Only files that need more than this include its
-/// header, which takes seconds to compile.
+/// The command line of a program, read by CLI11. Only files that need more than this include the
+/// header of CLI11, which takes seconds to compile.
 #pragma once
 
 #include <filesystem>
 #include <functional>
+#include <initializer_list>
 #include <memory>
 #include <string>
 
@@ -28,7 +29,7 @@ class Option {
 
   Option type_name(const std::string& name) const;
   Option required() const;
-  /// Of several values, or given several times, all are kept; `most` at a time.
+  /// Takes `least` to `most` values each time it is given, and keeps those of all times.
   Option repeatable(int least, int most) const;
   Option no_default() const;  ///< the help shows none
   Option range(int least, int most) const;
