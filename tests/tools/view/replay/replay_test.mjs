@@ -89,6 +89,19 @@ test("the slider shows the positions of the CSV file, and the load's colour is w
     const expected = toPixel(camera, row.load_y_m - camera.target_m[1], row.load_x_m - camera.target_m[0]);
     assert.ok(Math.hypot(projection.load[0] - expected[0], projection.load[1] - expected[1]) < 1.5, `step ${step}`);
   }
+  await page.setViewport({ width: 960, height: 600 }); // the buttons cover a fifth of it
+  for (const mode of ["top", "side"]) {
+    await page.click(`[data-camera=${mode}]`);
+    await page.click("#fit");
+    const camera = await page.evaluate("window.slsView.camera()");
+    const buttons = await page.$eval(".scene-tools", (tools) => tools.getBoundingClientRect().bottom);
+    const [tx, ty, tz] = camera.target_m;
+    for (const { step, quad_x_m: x, quad_y_m: y, quad_z_m: z } of rows) {
+      const [across, down] = mode === "top" ? toPixel(camera, y - ty, x - tx) : toPixel(camera, x - tx, tz - z);
+      assert.ok(across > 0 && across < camera.area.width && down > buttons && down < camera.area.top + camera.area.height,
+                `${mode}: the vehicle of step ${step} is at ${[across, down]}, outside or behind the buttons`);
+    }
+  }
   await page.click("[data-camera=follow]");
   await page.evaluate(() => new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done))));
   const { load } = await page.evaluate("window.slsView.projection(0)");

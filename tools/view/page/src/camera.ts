@@ -42,15 +42,18 @@ export class View {
     this.height = Math.max(1, height);
   }
 
-  /** Puts `box` into the picture. */
-  fit(box: Box3): void {
+  /** Puts `box` into the picture; a drawing to scale leaves `covered` CSS pixels at its top free, where the buttons are. */
+  fit(box: Box3, covered: number): void {
     if (box.isEmpty()) return;
     box.getCenter(this.target);
     const size = box.getSize(new Vector3());
     const aspect = this.width / this.height;
     if (this.isFlat) {
       const [across, up] = this.mode === "top" ? [size.y, size.x] : [size.x, size.z];
-      return this.setDistance((0.625 * Math.max(up, across / aspect, 1)) / Math.tan(kFieldOfView / 2));
+      const seen = Math.max(0.5, 1 - covered / this.height);
+      this.setDistance((0.625 * Math.max(up / seen, across / aspect, 1)) / Math.tan(kFieldOfView / 2));
+      this.target[this.mode === "top" ? "x" : "z"] += ((1 - seen) / 2) * this.heightMetres;
+      return;
     }
     const radius = Math.max(0.5 * size.length(), 0.8);
     this.setDistance(radius / Math.sin(kFieldOfView / 2) / Math.min(1, aspect * 1.1));

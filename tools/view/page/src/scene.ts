@@ -150,7 +150,8 @@ export class Scene {
     const rod = Math.max(...(this.layers[0]?.run.vehicles.map((vehicle) => vehicle.rod_length_m) ?? [1]));
     box.expandByPoint(new Vector3(box.min.x, box.min.y, Math.max(box.max.z, pathTop + rod)));
     if (box.min.z > height) box.min.z = height;
-    this.view.fit(box);
+    const buttons = document.querySelector<HTMLElement>(".scene-tools")!;
+    this.view.fit(box, buttons.offsetTop + buttons.offsetHeight);
     this.invalidate();
   }
 
