@@ -45,7 +45,8 @@ FlightWatch::FlightWatch(const config::Scenario& scenario, std::uint64_t run_id,
       vehicle_ids_(std::move(vehicle_ids)),
       began_(server.awake()),
       find_(std::move(find)),
-      status_(sync_, server, find_) {}
+      status_(sync_, server, find_),
+      requests_(run_id_, vehicle_ids_, find_) {}
 
 void FlightWatch::Client::hear(Instant now) {
   if (now - heard >= kForgottenAfter) back = now;
@@ -136,6 +137,7 @@ void FlightWatch::on_published(std::uint64_t step, Instant now) {
   disobeys(paused_, "an operator's pause");
   check_due(step, now);
   status_.on_published(step);
+  requests_.on_published(step);
   // The wait for recorders between two steps is no absence of a controller.
   if (has_begun_ && is_lockstep())
     for (auto& [vehicle, lacking] : lacking_) lacking.since += server_.awake() - recorded_awake_;
@@ -193,6 +195,7 @@ void FlightWatch::on_recorded(const std::vector<model::StepRecord>& records, Ins
   sent_.reset();
   recorded_awake_ = server_.awake();
   status_.on_recorded(records);
+  requests_.on_recorded(records.front().step);
   check_take_over(records, now);
   for (const model::StepRecord& record : records) {
     check_policy(record);

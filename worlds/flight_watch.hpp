@@ -19,6 +19,7 @@
 #include "sim_server/core/answers/judgement.hpp"
 #include "sls.h"
 #include "worlds/host.hpp"
+#include "worlds/request_check.hpp"
 #include "worlds/status_check.hpp"
 
 namespace sls::worlds {
@@ -52,8 +53,8 @@ class FlightWatch {
   void on_published(std::uint64_t step, Instant now);
   void on_resent(Instant now);
   void on_recorded(const std::vector<model::StepRecord>& records, Instant now);
-  /// An answer to an earlier step counts from now on.
-  void on_late() { lacking_.clear(); }
+  /// An answer of `vehicle` to an earlier step counts from now on.
+  void on_late(std::uint32_t vehicle) { lacking_.erase(vehicle); }
   /// A status of a flight that runs, not paused.
   void on_running(Instant now);
   /// The run fails with `reason`. False if it is none of those that participants cause.
@@ -63,6 +64,9 @@ class FlightWatch {
   void on_status(const SimStatus& status) { status_.on_status(status); }
   /// The server says `line`.
   void on_line(const std::string& line, Instant now);
+  /// What operators ask of it.
+  RequestCheck& requests() { return requests_; }
+  const RequestCheck& requests() const { return requests_; }
   /// Its process was stopped or continued, or became slower or faster: it may be late with all.
   void on_disturbed();
 
@@ -147,6 +151,7 @@ class FlightWatch {
   bool is_disturbed_ = false;    // since the last step was published
   Instant disturbed_{0};         // the last time, awake time of the server
   StatusCheck status_;
+  RequestCheck requests_;
   std::optional<std::pair<std::uint64_t, Instant>> schedule_;  // the first step and when it left
   Instant recorded_awake_{0};  // the last step, in awake time of the server
   std::optional<Instant> interrupted_, stop_requested_, paused_;  // awake time of the server

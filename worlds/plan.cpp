@@ -108,6 +108,16 @@ void share_fleet(Plan& plan, Random& random) {
   plan.programs.insert(plan.programs.end(), others.begin(), others.end());
 }
 
+/// The first client flies the first vehicle, the second one the others.
+void share_among_clients(Plan& plan) {
+  std::vector<PlannedProgram*> clients;
+  for (PlannedProgram& program : plan.programs)
+    if (program.role == Role::kClient) clients.push_back(&program);
+  const std::vector<std::uint32_t> ids = clients[0]->vehicle_ids;
+  clients[1]->vehicle_ids.assign(ids.begin() + 1, ids.end());
+  clients[0]->vehicle_ids = {ids.front()};
+}
+
 void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
                    const faults::Case* given) {
   const config::WaitFor& expected = flown.scenario.sync.wait_for;
@@ -170,6 +180,9 @@ void draw_programs(Plan& plan, Random& random, const FlownScenario& flown,
       plan.promise != Promise::kTwoServers && plan.promise != Promise::kSuspend &&
       random.chance(0.25))
     share_fleet(plan, random);
+  else if (!given && has_fleet && !has_standby && expected.controllers == 1 && clients == 2 &&
+           random.chance(0.5))
+    share_among_clients(plan);
   if (!given) return;
   const auto need = [&](const faults::Program& named) {
     while (!find_program(plan, named)) add(static_cast<Role>(named.role));

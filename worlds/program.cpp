@@ -2,6 +2,8 @@
 
 #include <spdlog/fmt/fmt.h>
 
+#include <utility>
+
 namespace sls::worlds {
 
 void Program::say(std::string text) {
@@ -55,7 +57,8 @@ void Program::set_slowness(Instant delay) {
 void Program::go_on() {
   if (process_.has_ended()) return;
   say("continued");
-  const Instant stopped = setting_.timeline.now() - stopped_since_;
+  const Instant stopped =
+      setting_.timeline.now() - std::exchange(stopped_since_, setting_.timeline.now());
   if (stopped >= std::chrono::milliseconds(500)) stopped_ += stopped;
   setting_.properties.on_continued(*this);
   setting_.properties.on_disturbed(*this);

@@ -110,6 +110,7 @@ void Properties::on_run(const Program& server, std::uint64_t run_id, const Param
                                              [this](std::string text) { find(std::move(text)); });
   for (const auto& [before_id, before] : runs_)
     if (before.server == &server) run.flight->follow(*before.flight);
+  run.scenario_sha256 = scenario.sha256;
   run.is_realtime = scenario.sync.mode == config::SyncMode::kRealtime;
   run.waits_for_recorders = scenario.sync.mode == config::SyncMode::kLockstep &&
                             scenario.sync.wait.recorder.policy == config::RecorderPolicy::kWait;
@@ -284,6 +285,7 @@ void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string 
   if (run.began) run.summary.duration_s = sync::to_seconds(timeline_.now() - *run.began);
   run.certificate = std::move(certificate);
   run.failure = reason;
+  run.flight->requests().on_end();
   run.is_failure_judged = reason.empty() || run.flight->on_failed(reason, timeline_.now());
 }
 
@@ -314,6 +316,7 @@ void Properties::check_client_end(const Program& client) {
 
 void Properties::on_announced(const Program& program, const Participant& message,
                               const sync::Servers& heard) {
+  check_announcement(program, message);
   if (message.run_id() == 0) return;
   const bool is_client = program.role() == Role::kClient;
   const auto flown = runs_.find(message.run_id());
@@ -342,6 +345,8 @@ void Properties::on_announced(const Program& program, const Participant& message
                                   : run.recorders.insert(program.name()).second;
   if (!is_first) return;
   run.ready_since[program.name()] = timeline_.now();
+  for (const std::uint32_t vehicle : message.vehicle_ids())
+    run.ready_of[vehicle].insert(program.name());
   // It may know the server first. Then the server learns of it at its next look.
   const Peer& server = run.server->peer();
   if (is_client && (server.matched_readers(TopicId::kState).count(program.id()) == 0 ||
@@ -350,6 +355,32 @@ void Properties::on_announced(const Program& program, const Participant& message
   if (!program.sees(run.server->id()))
     find(fmt::format("ready: {} says so of run {:016x} before it sees the server", program.name(),
                      message.run_id()));
+}
+
+/// What a program says of itself is true.
+void Properties::check_announcement(const Program& program, const Participant& message) {
+  const bool is_client = program.role() == Role::kClient;
+  if (!is_client && program.role() != Role::kRecorder) return;
+  const auto role = is_client ? ParticipantRole::ROLE_CONTROLLER : ParticipantRole::ROLE_RECORDER;
+  const auto run = runs_.find(message.run_id());
+  bool has_scenario =
+      run == runs_.end() || message.scenario_sha256().to_string() == run->second.scenario_sha256;
+  bool has_vehicles = message.vehicle_ids().empty();
+  if (is_client) {
+    const ClientProgram::Options& options = static_cast<const ClientProgram&>(program).options();
+    has_scenario = has_scenario || options.has_other_scenario;
+    const std::set<std::uint32_t> own(options.vehicle_ids.begin(), options.vehicle_ids.end());
+    const auto& said = message.vehicle_ids();
+    has_vehicles = !said.empty() && std::all_of(said.begin(), said.end(),
+                                                [&](auto id) { return own.count(id) > 0; });
+  }
+  const bool is_true = message.role() == role && has_scenario && has_vehicles &&
+                       message.contract_sha256().to_string() == bus::kContractSha256 &&
+                       message.host().to_string() == program.process().host().name() &&
+                       (!is_client || message.last_complete_step() == -1) &&
+                       (message.run_id() != 0 || (!message.ready() && !message.done()));
+  if (!is_true)
+    find(fmt::format("announces: {} says something of itself that is not so", program.name()));
 }
 
 void Properties::on_unclaimed(const Program& program, const Peer& writer, const Network& network) {
@@ -518,18 +549,21 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
   if (promise != Promise::kNone && !is_any_finished()) find("finishes: no flight was finished");
 }
 
+/// When `count` of the programs were ready.
+Instant Properties::find_ready(const Run& run, const std::set<std::string>& names,
+                               int count) const {
+  std::vector<Instant> since;
+  for (const std::string& name : names) since.push_back(run.ready_since.at(name));
+  std::sort(since.begin(), since.end());
+  return count > 0 ? since.at(static_cast<std::size_t>(count) - 1) : Instant(0);
+}
+
 /// A flight begins as soon as the expected ones are ready.
 void Properties::check_begin(std::uint64_t run_id, const Run& run, const FlownScenario& flown) {
   const config::WaitFor& expected = flown.scenario.sync.wait_for;
-  Instant ready{0};
-  const auto note = [&](const std::set<std::string>& names, int count) {
-    std::vector<Instant> since;
-    for (const std::string& name : names) since.push_back(run.ready_since.at(name));
-    std::sort(since.begin(), since.end());
-    if (count > 0) ready = std::max(ready, since[static_cast<std::size_t>(count) - 1]);
-  };
-  note(run.ready, expected.controllers);
-  note(run.recorders, expected.recorders);
+  Instant ready = find_ready(run, run.recorders, expected.recorders);
+  for (const auto& [vehicle, clients] : run.ready_of)
+    ready = std::max(ready, find_ready(run, clients, expected.controllers));
   if (*run.began > ready + kBeginsWithin)
     find(fmt::format("calm: run {:016x} begins {:.3f} s after the last one is ready", run_id,
                      sync::to_seconds(*run.began - ready)));

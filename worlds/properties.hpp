@@ -69,9 +69,9 @@ class Properties {
   /// States of a step leave for the first time.
   void on_published(std::uint64_t run_id, std::uint64_t step, const config::WaitFor& expected);
   void on_recorded(std::uint64_t run_id, const std::vector<model::StepRecord>& records);
-  void on_late(std::uint64_t run_id) {
+  void on_late(std::uint64_t run_id, std::uint32_t vehicle) {
     runs_[run_id].has_late = true;
-    runs_[run_id].flight->on_late();
+    runs_[run_id].flight->on_late(vehicle);
   }
   void on_status(const SimStatus& status, const Network& network);
   /// `reason`: why it failed.
@@ -112,10 +112,12 @@ class Properties {
   struct Run {
     const Program* server = nullptr;
     std::vector<std::uint32_t> vehicle_ids;
-    std::set<std::string> ready;                       // clients that have announced it
-    std::set<std::string> recorders;                   // the same
-    std::set<std::string> wrong;                       // clients that make mistakes
-    std::map<std::string, Instant> ready_since, done;  // recorders
+    std::string scenario_sha256;
+    std::set<std::string> ready;                              // clients that have announced it
+    std::map<std::uint32_t, std::set<std::string>> ready_of;  // the same, by vehicle
+    std::set<std::string> recorders;                          // the same
+    std::set<std::string> wrong;                              // clients that make mistakes
+    std::map<std::string, Instant> ready_since, done;         // recorders
     std::unique_ptr<FlightWatch> flight;
     std::map<std::uint32_t, std::vector<std::uint64_t>> rows;  // hashes, by vehicle and step
     std::map<std::uint32_t, model::StepRecord> last;
@@ -147,6 +149,7 @@ class Properties {
   };
 
   void find(std::string finding);
+  void check_announcement(const Program& program, const Participant& message);
   void check_join(const Program& program, std::uint64_t run_id, std::uint64_t left,
                   const sync::Servers& heard);
   int count_living(const Run& run, const std::set<std::string>& names) const;
@@ -165,6 +168,7 @@ class Properties {
   void check_client_end(const Program& client);
   void check_silence(const Program& program, std::uint64_t run_id, double said_s);
   void check_begin(std::uint64_t run_id, const Run& run, const FlownScenario& flown);
+  Instant find_ready(const Run& run, const std::set<std::string>& names, int count) const;
   void check_end(const Program& server, const std::vector<std::unique_ptr<Program>>& programs);
 
   const Timeline& timeline_;

@@ -74,7 +74,8 @@ void ServerProgram::begin_run(sim::ServerCore::Start start) {
       sim::make_parameters_message(start.run_id, vehicle_ids_, scenario, fleet->plant(), "world");
   certificate_.emplace(record::make_row_format(parameters));
   setting_.properties.on_run(*this, start.run_id, parameters, scenario);
-  flight_ = &setting_.properties.flight(start.run_id);
+  const FlightWatch* before = std::exchange(flight_, &setting_.properties.flight(start.run_id));
+  if (before) flight_->requests().follow(before->requests());
   peer_.write(parameters);
   say(fmt::format("run {:016x}", start.run_id));
   sim::Outputs& outputs = *this;
@@ -101,8 +102,15 @@ void ServerProgram::deliver_events() {
     if (auto* sample = std::get_if<sim::CommandSample>(&event))
       core_->on_commands(*sample);
     else
-      core_->on_request(std::get<SimControl>(event), *this, now());
+      take_up(std::get<SimControl>(event));
   }
+}
+
+void ServerProgram::take_up(const SimControl& request) {
+  const bool is_of_other =
+      request.run_id() != core_->run_id() && is_known_elsewhere(request.run_id());
+  flight_->requests().on_request(request, is_of_other);
+  core_->on_request(request, *this, now());
 }
 
 void ServerProgram::end_run() {
@@ -147,6 +155,7 @@ void ServerProgram::write_waiting() {
       peer_.write(*status);
     } else if (const auto* reply = std::get_if<SimControlReply>(&item)) {
       setting_.properties.on_replied(*this, reply->request_id(), setting_.network);
+      flight_->requests().on_reply(*reply);
       peer_.write(*reply);
     } else if (const auto* line = std::get_if<sync::Line>(&item)) {
       say(*line);
@@ -211,7 +220,7 @@ void ServerProgram::record_step(const sim::Fleet& fleet) {
 }
 
 void ServerProgram::record_late(const sim::Vehicle& vehicle, const sim::OfferedAnswer& offered) {
-  setting_.properties.on_late(core_->run_id());
+  setting_.properties.on_late(core_->run_id(), vehicle.record().vehicle_id);
   batches_->add(sim::make_late_record(vehicle, offered));
 }
 

@@ -35,6 +35,7 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   void begin_run(sim::ServerCore::Start start);
   void on_commands(const Commands& sample, const Peer::Arrival& arrival);
   void deliver_events();
+  void take_up(const SimControl& request);
   void write_waiting();
   void write_records(bool is_last);
   void end_run();

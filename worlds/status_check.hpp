@@ -33,17 +33,23 @@ class StatusCheck {
   void on_disturbed() { is_disturbed_ = true; }
 
  private:
+  /// Steps of vehicles.
+  struct Counts {
+    std::uint64_t held = 0, fail_safe = 0;
+    std::uint64_t worst_age = 0;  // of a held answer, steps
+  };
+
   void check_counter(const char* name, std::uint64_t said, std::uint64_t happened,
                      std::uint64_t most);
-  std::string describe_timing(std::uint64_t steps) const;
+  std::string describe_timing(const Counts& counts, std::uint64_t steps) const;
 
   const config::Sync& sync_;
   const Program& server_;
   const std::function<void(std::string)> find_;
   std::uint64_t step_ = 0;  // the last one published
-  std::uint64_t resent_ = 0, held_ = 0, fail_safe_ = 0, changes_ = 0;
+  Counts counts_, before_;  // before_: without the last step
+  std::uint64_t resent_ = 0, changes_ = 0;
   std::uint64_t accepted_ = 0, answered_ = 0, flown_ = 0;  // steps of vehicles
-  std::uint64_t worst_age_ = 0;                            // of a held answer, steps
   std::map<std::uint32_t, std::string> flyers_;            // the last ones, by vehicle
   std::optional<SimStatus> last_;
   Instant last_time_{0};        // awake time of the server
