@@ -83,6 +83,15 @@ std::uint64_t hash_row(const model::StepRecord& record) {
   return hash;
 }
 
+std::uint64_t hash_answer(const model::StepRecord& record) {
+  std::uint64_t hash = kEmptyHash;
+  mix(hash, static_cast<std::uint64_t>(record.kind));
+  mix(hash, record.answered_step);
+  mix(hash, std::hash<std::string>()(record.client_name));
+  mix_vector(hash, record.answer.f_Q_W);
+  return hash;
+}
+
 void Properties::find(std::string finding) {
   trace_.add(timeline_.now(), "FOUND", finding);
   findings_.push_back(std::move(finding));
@@ -174,6 +183,7 @@ void Properties::on_recorded(std::uint64_t run_id, const std::vector<model::Step
       find(fmt::format("order: run {:016x} records step {} of vehicle {}, expected {}", run_id,
                        record.step, record.vehicle_id, rows.size()));
     rows.push_back(hash_row(record));
+    run.answers[record.vehicle_id].push_back(hash_answer(record));
     const auto before = run.last.find(record.vehicle_id);
     if (before != run.last.end() && !run.has_faulty_forces) check_applied(before->second, record);
     run.last[record.vehicle_id] = record;
@@ -577,7 +587,7 @@ void Properties::check_recording(const Program& program, const StoredRecording& 
                             program.name(), recording.run_id));
   const Run& run = found->second;
   check_rows(program, recording, run);
-  if (recording.phase) check_claims(program, recording);
+  if (recording.status) check_claims(program, recording, run);
   for (const std::string& damage : recording.damages)
     find(fmt::format("disk: {}: {}", program.name(), damage));
   if (promise == Promise::kCalm && run.has_ended && recording.claims.outcome == "failed")
@@ -649,15 +659,23 @@ void Properties::check_rows(const Program& program, const StoredRecording& recor
   }
 }
 
-/// The outcome and the missing statuses are those of what came to be written.
-void Properties::check_claims(const Program& program, const StoredRecording& recording) {
+/// What the manifest says is that of what came to be written.
+void Properties::check_claims(const Program& program, const StoredRecording& recording,
+                              const Run& run) {
   const record::Claims& claims = recording.claims;
-  const std::string phase = bus::to_string(*recording.phase);
+  const std::string phase = bus::to_string(recording.status->phase());
   if (!may_claim(claims.outcome, recording.is_closed, phase))
     find(fmt::format("outcome: {} says '{}' {} its end, and the last phase it heard is {}",
                      program.name(), claims.outcome, recording.is_closed ? "after" : "before",
                      phase));
   if (!recording.is_closed || claims.missing.further_gaps > 0) return;
+  check_answers(program, recording, run);
+  if (is_end(phase) && claims.last_step != recording.status->step())
+    find(fmt::format("outcome: {} says that step {} is the last one, the last status says {}",
+                     program.name(), claims.last_step, recording.status->step()));
+  if (claims.complete && claims.reason != recording.status->reason().to_string())
+    find(fmt::format("outcome: {} says '{}', the last status '{}'", program.name(), claims.reason,
+                     recording.status->reason().c_str()));
   std::set<std::uint64_t> all = recording.statuses;
   for (const record::MissingSteps& gap : claims.missing.listed)
     if (gap.topic == "sls/status")
@@ -668,6 +686,49 @@ void Properties::check_claims(const Program& program, const StoredRecording& rec
   if (all.size() != *all.rbegin() + 1)
     find(fmt::format("rows: {}: of {} statuses {} are there or listed as missing", program.name(),
                      *all.rbegin() + 1, all.size()));
+}
+
+/// Each row has the answer with which its step was flown, or that is listed as missing.
+void Properties::check_answers(const Program& program, const StoredRecording& recording,
+                               const Run& run) {
+  const record::Claims& claims = recording.claims;
+  std::uint64_t unanswered = 0;
+  for (const auto& [vehicle, kept] : recording.rows) {
+    const auto is_listed = [&, id = vehicle](const char* topic, std::uint64_t step) {
+      const auto& gaps = claims.missing.listed;
+      return std::any_of(gaps.begin(), gaps.end(), [&](const record::MissingSteps& gap) {
+        return gap.vehicle_id == id && gap.topic == topic && gap.from <= step && step <= gap.to;
+      });
+    };
+    const auto flown = run.answers.find(vehicle);
+    const auto late = run.late.find(vehicle);
+    for (std::size_t i = 0; i < kept.answers.size(); ++i) {
+      const StoredRecording::Answer& answer = kept.answers[i];
+      const std::uint64_t step = kept.steps[i];
+      unanswered += answer.is_unanswered;
+      const bool was_late = late != run.late.end() && late->second.count(step) > 0;
+      const bool is_last = i + 1 == kept.answers.size();
+      const bool lacks_one = !answer.has_command && !is_last && !is_listed("sls/command", step);
+      const bool lacks_other = !answer.has_reference && !answer.is_unanswered && !is_last &&
+                               !is_listed("sls/reference", step);
+      if (lacks_one || lacks_other)
+        find(fmt::format("answers: {} lacks that of step {} of vehicle {}, and does not list it",
+                         program.name(), step, vehicle));
+      else if (flown == run.answers.end() || flown->second.at(step) != answer.hash)
+        find(fmt::format("answers: {} has another than that of step {} of vehicle {}",
+                         program.name(), step, vehicle));
+      else if (answer.is_unanswered && answer.has_reference != was_late &&
+               (answer.has_reference || claims.complete))
+        find(fmt::format("answers: {} has {} late answer to step {} of vehicle {}", program.name(),
+                         answer.has_reference ? "a" : "no", step, vehicle));
+      else
+        continue;
+      return;
+    }
+  }
+  if (unanswered != claims.unanswered_steps)
+    find(fmt::format("answers: {} says that {} steps are without one, and has {}", program.name(),
+                     claims.unanswered_steps, unanswered));
 }
 
 /// A server ends soon after the recorders of its finished run, and not before them.

@@ -28,9 +28,16 @@ class Program;
 
 /// The rows that a recording holds on the simulated disk, and what its manifest claims.
 struct StoredRecording {
+  /// What the rows of a step say of its answer.
+  struct Answer {
+    std::uint64_t hash = 0;
+    bool is_unanswered = false;  ///< flown with a held answer or the fail-safe force
+    bool has_command = false, has_reference = false;
+  };
   struct Rows {
     std::vector<std::uint64_t> steps;   ///< as they were written
     std::vector<std::uint64_t> hashes;  ///< of the rows
+    std::vector<Answer> answers;        ///< likewise; only of a recorder without a folder
   };
   std::uint64_t run_id = 0;
   bool is_closed = false;
@@ -40,7 +47,7 @@ struct StoredRecording {
   std::map<std::uint32_t, Rows> rows;  ///< by vehicle
   // What came to be written; only of a recorder without a folder.
   std::set<std::uint64_t> statuses;  ///< their indices
-  std::optional<RunPhase> phase;     ///< of the last status
+  std::optional<SimStatus> status;   ///< the last one
 };
 
 /// The course of a finished flight.
@@ -51,8 +58,9 @@ struct FlightSummary {
   std::uint64_t late = 0;  ///< steps flown without a fresh answer
 };
 
-/// The content of a row that no late answer changes.
+/// The content of a row that no late answer changes: the state, and the answer.
 std::uint64_t hash_row(const model::StepRecord& record);
+std::uint64_t hash_answer(const model::StepRecord& record);
 
 class Properties {
  public:
@@ -69,8 +77,10 @@ class Properties {
   /// States of a step leave for the first time.
   void on_published(std::uint64_t run_id, std::uint64_t step, const config::WaitFor& expected);
   void on_recorded(std::uint64_t run_id, const std::vector<model::StepRecord>& records);
-  void on_late(std::uint64_t run_id, std::uint32_t vehicle) {
+  /// A late answer to `step` is recorded.
+  void on_late(std::uint64_t run_id, std::uint32_t vehicle, std::uint64_t step) {
     runs_[run_id].has_late = true;
+    runs_[run_id].late[vehicle].insert(step);
     runs_[run_id].flight->on_late(vehicle);
   }
   void on_status(const SimStatus& status, const Network& network);
@@ -119,7 +129,9 @@ class Properties {
     std::set<std::string> wrong;                              // clients that make mistakes
     std::map<std::string, Instant> ready_since, done;         // recorders
     std::unique_ptr<FlightWatch> flight;
-    std::map<std::uint32_t, std::vector<std::uint64_t>> rows;  // hashes, by vehicle and step
+    std::map<std::uint32_t, std::vector<std::uint64_t>> rows;     // hashes, by vehicle and step
+    std::map<std::uint32_t, std::vector<std::uint64_t>> answers;  // the same
+    std::map<std::uint32_t, std::set<std::uint64_t>> late;        // steps with late answers
     std::map<std::uint32_t, model::StepRecord> last;
     bool is_exact = true;  // each force answers its own state
     bool has_late = false;
@@ -162,7 +174,8 @@ class Properties {
   /// All rows of the run are there.
   void check_whole(const Program& program, const StoredRecording& recording, const Run& run);
   void check_rows(const Program& program, const StoredRecording& recording, const Run& run);
-  void check_claims(const Program& program, const StoredRecording& recording);
+  void check_claims(const Program& program, const StoredRecording& recording, const Run& run);
+  void check_answers(const Program& program, const StoredRecording& recording, const Run& run);
   void check_failure(const Program& server, const FlownScenario& flown);
   void check_exit(const Program& program);
   void check_client_end(const Program& client);

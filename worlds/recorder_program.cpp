@@ -200,7 +200,7 @@ bool RecorderProgram::write_samples() {
       writing_->add(status);
       if (options_.folder.empty() && status.run_id() == recordings_.back().run_id) {
         recordings_.back().statuses.insert(status.sample_index());
-        recordings_.back().phase = status.phase();
+        recordings_.back().status = status;
       }
     }
   }

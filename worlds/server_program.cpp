@@ -220,7 +220,7 @@ void ServerProgram::record_step(const sim::Fleet& fleet) {
 }
 
 void ServerProgram::record_late(const sim::Vehicle& vehicle, const sim::OfferedAnswer& offered) {
-  setting_.properties.on_late(core_->run_id(), vehicle.record().vehicle_id);
+  setting_.properties.on_late(core_->run_id(), vehicle.record().vehicle_id, offered.step);
   batches_->add(sim::make_late_record(vehicle, offered));
 }
 

@@ -49,7 +49,10 @@ MemoryRecording::MemoryRecording(StoredRecording& stored, const Parameters& para
 
 bool MemoryRecording::add(const record::StepRows& rows) {
   certificate_.add(rows);
-  if (rows.has_state) add_row(unwritten_, rows);
+  if (!rows.has_state) return false;
+  add_row(unwritten_, rows);
+  unwritten_[rows.vehicle_id].answers.push_back(
+      {hash_answer(rows), rows.is_unanswered(), rows.has_command, rows.has_reference});
   return false;
 }
 
@@ -59,6 +62,7 @@ void MemoryRecording::flush() {
     StoredRecording::Rows& kept = stored_.rows[vehicle];
     kept.steps.insert(kept.steps.end(), rows.steps.begin(), rows.steps.end());
     kept.hashes.insert(kept.hashes.end(), rows.hashes.begin(), rows.hashes.end());
+    kept.answers.insert(kept.answers.end(), rows.answers.begin(), rows.answers.end());
     rows = {};
   }
 }
