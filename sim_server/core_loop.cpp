@@ -28,10 +28,8 @@ void CoreLoop::run(ServerCore& core) {
     lock.lock();
     main_wants_core_ = false;
     if (const auto time = now(); is_late && !core.is_look_due(time)) unanswered_ = time;
-    if (core.has_news(around_)) core.on_look(around_, now());
-    deliver_events(core);
-    core.on_time(now());
-    if (const auto time = now(); core.is_look_due(time)) core.on_look(around_, time);
+    core.on_wake(
+        around_, [this](ServerCore& woken) { deliver_events(woken); }, now);
   }
   core_ = nullptr;
   lock.unlock();

@@ -55,9 +55,7 @@ class CoreLoop {
   bool pass_on(const Fill& fill) {
     if (main_wants_core_ || !commands_.is_empty() || !requests_.is_empty()) return false;
     const std::unique_lock lock(core_mutex_, std::try_to_lock);
-    if (!lock || !core_ || core_->phase() != ServerCore::Phase::kAwaitingAnswers ||
-        core_->has_news(around_))
-      return false;
+    if (!lock || !core_ || !core_->takes_answers_at_once(around_)) return false;
     fill(received_);
     core_->on_commands(received_);
     note_deadline();

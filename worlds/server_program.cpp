@@ -87,12 +87,9 @@ void ServerProgram::begin_run(sim::ServerCore::Start start) {
 void ServerProgram::wake() {
   if (leaving_) return linger();
   write_waiting();
-  if (core_->phase() != sim::ServerCore::Phase::kEnded) {
-    if (core_->has_news(*this)) core_->on_look(*this, now());
-    deliver_events();
-    core_->on_time(now());
-    if (core_->is_look_due(now())) core_->on_look(*this, now());
-  }
+  if (core_->phase() != sim::ServerCore::Phase::kEnded)
+    core_->on_wake(
+        *this, [this](sim::ServerCore&) { deliver_events(); }, [this] { return now(); });
   if (core_->phase() == sim::ServerCore::Phase::kEnded) end_run();
   if (!process_.has_ended()) wake_at(leaving_ ? now() : core_->next_deadline());
 }
@@ -176,8 +173,7 @@ void ServerProgram::on_commands(const Commands& sample, const Peer::Arrival& arr
   received.written = arrival.written;
   sim::fill(received, sample);
   // As CoreLoop::pass_on.
-  if (!is_realtime() && events_.empty() &&
-      core_->phase() == sim::ServerCore::Phase::kAwaitingAnswers && !core_->has_news(*this)) {
+  if (!is_realtime() && events_.empty() && core_->takes_answers_at_once(*this)) {
     core_->on_commands(received);
     if (!outbox_.empty() || core_->phase() == sim::ServerCore::Phase::kEnded) wake_soon();
     return wake_at(core_->next_deadline());

@@ -80,6 +80,20 @@ class ServerCore {
   /// published, or the run after a reset not be made.
   void on_failure(const std::string& reason, sync::Time now);
 
+  /// The main thread has woken: looks, calls `deliver(core)` for what waits, and goes on, in the
+  /// order that the rules need. `now()`: the time.
+  template <class Deliver, class Clock>
+  void on_wake(Surroundings& around, const Deliver& deliver, const Clock& now) {
+    if (has_news(around)) on_look(around, now());
+    deliver(*this);
+    on_time(now());
+    if (const sync::Time time = now(); is_look_due(time)) on_look(around, time);
+  }
+  /// True if answers may be given to the core as they come, not only when the main thread wakes.
+  bool takes_answers_at_once(const Surroundings& around) const {
+    return phase_ == Phase::kAwaitingAnswers && !has_news(around);
+  }
+
   bool is_look_due(sync::Time now) const { return now >= looked_ + calc_look_interval(); }
   /// True if the run has news for on_look, which no plain step may precede.
   bool has_news(const Surroundings& around) const { return parts_.watch.has_news(around); }

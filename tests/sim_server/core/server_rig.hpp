@@ -239,9 +239,8 @@ class ServerRig : public Outputs, public Surroundings {
     return member;
   }
   void look() {
-    if (core_->has_news(*this)) core_->on_look(*this, now_);
-    core_->on_time(now_);
-    if (core_->is_look_due(now_)) core_->on_look(*this, now_);
+    core_->on_wake(
+        *this, [](ServerCore&) {}, [this] { return now_; });
   }
   std::string stamp(const std::string& text) const { return fmt::format("{}: {}", ms(), text); }
 
