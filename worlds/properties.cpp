@@ -32,6 +32,10 @@ constexpr Instant kBeginsWithin = 60ms;
 constexpr Instant kHeardWithin = 2s;
 /// The same over links that lose most: statuses come in their order.
 constexpr Instant kKnownWithin = 10s;
+/// Characters of a problem in a status (idl/sls.idl); a longer one is cut.
+constexpr std::size_t kMostProblem = 255;
+/// A program is known to repeat its announcement.
+constexpr Instant kRepeatsWithin = 3s;
 /// Time for which a server in real time asks for the last answers (sim::RealtimePacing).
 constexpr Instant kLastAttempts = 1s;
 
@@ -218,6 +222,7 @@ void Properties::check_applied(const model::StepRecord& before, const model::Ste
 void Properties::on_status(const SimStatus& status, const Network& network) {
   Run& run = runs_[status.run_id()];
   run.flight->on_status(status);
+  check_problem(status);
   run.timing = status.timing().to_string();
   if (!run.has_status || run.phase != status.phase()) run.phase_since = timeline_.now();
   run.has_status = true;
@@ -231,6 +236,40 @@ void Properties::on_status(const SimStatus& status, const Network& network) {
   if (run.phase != RunPhase::PHASE_RUNNING) return;
   run.flight->on_running(timeline_.now());
   check_stall(run, status.run_id());
+}
+
+/// No program is accused of a mistake that it does not make.
+void Properties::check_problem(const SimStatus& status) {
+  const std::string text = status.problem().to_string();
+  for (std::size_t begin = 0; begin < text.size();) {
+    const std::size_t end = std::min(text.size(), text.find("; ", begin));
+    const std::string problem = text.substr(begin, end - begin);
+    const bool is_whole = end < text.size() || text.size() < kMostProblem;
+    begin = end + 2;
+    const auto holds = [&](const char* part) { return problem.find(part) != problem.npos; };
+    const std::size_t quote = problem.find('\'');
+    if (!is_whole || quote == problem.npos) continue;
+    const std::string name = problem.substr(quote + 1, problem.find('\'', quote + 1) - quote - 1);
+    const auto known = announced_.find(name);
+    if (known == announced_.end() || !known->second.is_honest) continue;
+    // One that dies before it repeats its announcement may be one that need not.
+    const auto killed = killed_.find(name);
+    if (killed != killed_.end() && killed->second - known->second.since < kRepeatsWithin) continue;
+    const std::string& host = runs_.at(status.run_id()).server->process().host().name();
+    const std::size_t got = problem.rfind("got ");
+    const bool is_true = holds("source timestamp") ? !holds((" on " + host + ":").c_str())
+                         : holds("library_sha256") ? has_libraries_
+                         : holds("run_id: ") ? is_of_other_run(problem.substr(got + 4), status)
+                                             : false;
+    if (!is_true) find(fmt::format("accuses: {}", problem));
+  }
+}
+
+/// `run_id`: in hexadecimal digits.
+bool Properties::is_of_other_run(const std::string& run_id, const SimStatus& status) const {
+  return std::any_of(runs_.begin(), runs_.end(), [&](const auto& run) {
+    return run.first != status.run_id() && fmt::format("{:016x}", run.first) == run_id;
+  });
 }
 
 /// Those that the server may presume alive: it need not know of a recent death, and the last
@@ -327,6 +366,14 @@ void Properties::check_client_end(const Program& client) {
 void Properties::on_announced(const Program& program, const Participant& message,
                               const sync::Servers& heard) {
   check_announcement(program, message);
+  has_libraries_ = has_libraries_ || message.library_sha256().size() > 0;
+  const bool is_honest =
+      program.role() == Role::kRecorder ||
+      (program.role() == Role::kClient && static_cast<const ClientProgram&>(program).is_honest());
+  const auto known =
+      announced_.try_emplace(message.name().to_string(), Announced{is_honest, timeline_.now()})
+          .first;
+  known->second.is_honest = known->second.is_honest && is_honest;
   if (message.run_id() == 0) return;
   const bool is_client = program.role() == Role::kClient;
   const auto flown = runs_.find(message.run_id());

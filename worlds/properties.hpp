@@ -160,7 +160,14 @@ class Properties {
     bool is_stall_found = false;
   };
 
+  struct Announced {
+    bool is_honest = false;  // makes no mistakes on purpose
+    Instant since{0};
+  };
+
   void find(std::string finding);
+  void check_problem(const SimStatus& status);
+  bool is_of_other_run(const std::string& run_id, const SimStatus& status) const;
   void check_announcement(const Program& program, const Participant& message);
   void check_join(const Program& program, std::uint64_t run_id, std::uint64_t left,
                   const sync::Servers& heard);
@@ -189,6 +196,8 @@ class Properties {
   std::map<std::uint64_t, Run> runs_;
   std::map<std::string, Instant> killed_, stopped_, continued_;  // by name
   std::map<std::string, std::uint64_t> joined_;                  // last runs
+  std::map<std::string, Announced> announced_;                   // by announced name
+  bool has_libraries_ = false;                                   // of clients
   std::set<std::string> too_late_;                               // that joined a run after its end
   std::map<std::pair<const Program*, const Program*>, Instant> rivals_;  // fly together since
   bool is_overloaded_ = false;  // a flight in real time failed beside a full link

@@ -42,6 +42,8 @@ struct Member {
   bool is_gone = false;
 
   bool is_silent(Time now) const { return now - heard > kPresumedDeadAfter; }
+  /// Its silence means that it is gone.
+  bool is_presumed_dead(Time now) const { return is_repeated && is_silent(now); }
 };
 
 /// The last announcement of every controller and recorder. At most 256 participants, because other

@@ -136,6 +136,7 @@ void AnswerCheck::look(const Neighbourhood& neighbourhood, Findings& findings) {
       seen = is_over ? sender.seen.erase(seen) : std::next(seen);
     }
     if (member) {
+      if (!neighbourhood.is_flying) sender.rejected_since = neighbourhood.now;
       look_at(sender, *member, neighbourhood.now, findings);
     } else {  // that is reported; it may announce itself under any name
       Sender unannounced;
@@ -163,7 +164,7 @@ void AnswerCheck::look_at(Sender& sender, const sync::Member& member, sync::Time
                  fmt::format("{}: sls/command: expected one answer to each state, got over {} "
                              "copies of each",
                              describe_participant(member), kMostCopies));
-  if (sender.rejected == 0) return;
+  if (sender.rejected == 0 || member.is_presumed_dead(now)) return;
   if (!sender.rejected_since) sender.rejected_since = now;
   const bool is_few = sender.is_old && sender.rejected < kFewOldAnswers;
   if (!findings.has_any(member.peer) && !is_few &&

@@ -105,6 +105,7 @@ const std::map<std::string, std::string>& ParticipantCheck::look(
 void ParticipantCheck::look_at(const sync::Member& member, const Neighbourhood& neighbourhood) {
   const Participant& announcement = member.announcement;
   if (neighbourhood.other_runs.count(announcement.run_id()) > 0) return;
+  if (member.is_presumed_dead(neighbourhood.now)) return;  // that is the cause, not its mistakes
   if (!has_this_contract(announcement)) {
     findings_.add(member, "contract", "contract_sha256", bus::kContractSha256,
                   to_words(announcement.contract_sha256().to_string()));

@@ -68,6 +68,7 @@ void ParticipantWatch::look(Surroundings& around, sync::Time now) {
   Neighbourhood neighbourhood = around.find_neighbours();
   neighbourhood.now = now;
   neighbourhood.is_on_network = !around.stays_on_this_machine();
+  neighbourhood.is_flying = report_.phase() == RunPhase::PHASE_RUNNING;
   neighbourhood.stamps_ahead_s = stamps_.take();
   report_.problem = around.replace_problems(check_.look(neighbourhood));
   problems_version_ = around.problems_version();

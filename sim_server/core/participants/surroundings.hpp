@@ -22,6 +22,7 @@ struct Neighbourhood {
   std::set<std::uint32_t> other_vehicles;  ///< vehicles of other servers
   /// On a network packets are lost, and discovery needs longer.
   bool is_on_network = false;
+  bool is_flying = true;  ///< nobody need answer while a run waits or is paused
   /// Participants with a matched writer of sls/command, as text.
   std::map<bus::PeerId, std::string> command_writers;
   std::set<bus::PeerId> state_readers;  ///< participants with a matched reader of sls/state

@@ -58,6 +58,7 @@ sync::Member parse_member(const std::string& text) {
       {"unready", [&] { announcement.ready(false); }},
       {"done", [&] { announcement.done(true); }},
       {"gone", [&] { entry.is_gone = true; }},
+      {"silent", [&] { entry.is_repeated = true; }},
       {"vehicles", [&] {
          announcement.vehicle_ids().clear();
          std::istringstream ids(value);
@@ -94,6 +95,7 @@ OfferedAnswer parse_answer(const std::string& text) {
 ///
 ///     members 1 run=cd, 2       their announcements (parse_member)
 ///     network                   packets may be lost
+///     pause, resume             nobody need answer, or again
 ///     unmatched                 endpoints of controllers match only if the next two say so
 ///     writer 1, reader 1        of sls/command and sls/state; also no-writer 1
 ///     explained 1               another problem is reported already
@@ -155,6 +157,8 @@ class CheckEventsTest : public testing::Test {
     const std::map<std::string, std::function<void()>> events = {
         {"members", [&] { neighbourhood_.participants = parse_members(rest); }},
         {"network", [&] { neighbourhood_.is_on_network = true; }},
+        {"pause", [&] { neighbourhood_.is_flying = false; }},
+        {"resume", [&] { neighbourhood_.is_flying = true; }},
         {"unmatched", [&] { are_matched_ = false; }},
         {"writer", [&] { neighbourhood_.command_writers[peer()] = kWriter; }},
         {"no-writer", [&] { neighbourhood_.command_writers.erase(peer()); }},
@@ -233,6 +237,8 @@ const Row kRows[] = {
     {"AControllerOfAnotherServerIsNotOurs",
      "members 1 run=cd vehicles=7 scenario=, 2 run=0 vehicles=8 | server cd 7 | deadline 1 " +
          kDeadline + " | deadline 2 " + kDeadline + " | look 0 none | look 5000 none"},
+    {"OfADeadOneNothingIsReported",
+     "members 1 run=cd silent | other-run 5 5 run=cd | look 0 none | look 9000 none"},
     {"UnknownVehiclesAreReportedOnceTheyLast",
      "members 1 vehicles=1+7+8+20 | server cd 20 | look 0 none | look 4000 " + kField +
          "vehicle_ids: expected 0-1, got 7-8 | members 1 vehicles= | look 5000 none | look 9000 " +
@@ -320,6 +326,10 @@ const Row kRows[] = {
      "members 1 | look 0 none | unknown-vehicle 5 5 vehicle=9 | rejections  (1 of its answers "
      "rejected, none taken: vehicle_id: expected 0-1, got 9) | wrong-step 500 3 | rejections  (2 "
      "of its answers rejected, none taken: step: expected 500, got 3)"},
+    {"APauseIsNoTimeWithoutAnswersThatAreTaken",
+     "members 1 | other-run 5 5 run=cd | look 0 none | pause | look 5000 none | look 9000 none | "
+     "resume | look 12900 none | look 13000 " +
+         kFoo + "sls/command: 1 answers rejected, none taken: " + kOtherRun},
     {"AFewAnswersToOldStepsAreNoMistake",
      "members 1 | wrong-step 500 3 | wrong-step 500 4 | look 0 none | look 5000 none | "
      "wrong-step 500 5 | look 6000 " +

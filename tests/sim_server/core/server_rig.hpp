@@ -299,7 +299,11 @@ class ServerRig : public Outputs, public Surroundings {
   bool stays_on_this_machine() const override { return is_on_this_machine; }
   bool has_heard_every_claim() const override { return knows_every_claim; }
   std::uint64_t problems_version() const override { return problem.size(); }
-  Neighbourhood find_neighbours() override { return neighbourhood; }
+  Neighbourhood find_neighbours() override {
+    Neighbourhood seen = neighbourhood;
+    for (sync::Member& member : seen.participants) member.heard = now_;
+    return seen;
+  }
   std::string replace_problems(const std::map<std::string, std::string>& found) override {
     return found.empty() ? problem : found.begin()->second;
   }
