@@ -36,10 +36,11 @@ class ClientProgram : public Program {
   const Options& options() const { return options_; }
   bool has_flown() const { return answerer_ != nullptr; }
   bool keeps_contract() const { return !options_.breaks_at; }
-  /// It answers and announces itself as it should.
+  /// It answers and announces itself as our clients do.
   bool is_honest() const {
     return keeps_contract() && !options_.is_sloppy && !options_.is_early && !options_.has_library &&
-           !options_.has_other_scenario && !options_.says_done && options_.announced_name.empty();
+           !options_.has_other_scenario && !options_.says_done && !options_.announces_once &&
+           options_.announced_name.empty();
   }
 
  private:
