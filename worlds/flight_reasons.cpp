@@ -114,8 +114,9 @@ void FlightWatch::check_start(const std::string& reason, Instant now) {
 void FlightWatch::check_absence(const std::string& reason, const std::string& named, Instant now) {
   if (is_unclear()) return;
   if (holds(named, "(none is ready)") &&
-      std::any_of(clients_.begin(), clients_.end(),
-                  [&](const auto& item) { return is_there(item.second, now); }))
+      std::any_of(clients_.begin(), clients_.end(), [&](const auto& item) {
+        return is_there(item.second, now) && item.second.vehicle_ids.size() == vehicle_ids_.size();
+      }))
     find_("reason: " + reason + ", but a controller is ready");
   const auto find_one = [&](const std::string& name) {
     const auto clients = find_clients(name);
@@ -144,7 +145,7 @@ void FlightWatch::check_early(const std::string& reason, Instant since, double d
 bool FlightWatch::is_there(const Client& client, Instant now) const {
   const bus::PeerId& peer = std::get<bus::PeerId>(client.order);
   return client.is_ready && !client.process->has_ended() && client.ready + kReadySince < now &&
-         server_.awake() - client.heard_awake < kHeardSince &&
+         client.back + kReadySince < now && server_.awake() - client.heard_awake < kHeardSince &&
          server_.peer().matched_readers(TopicId::kState).count(peer) > 0 &&
          server_.peer().matched_writers(TopicId::kCommand).count(peer) > 0;
 }

@@ -76,6 +76,7 @@ void FlightWatch::on_member(const Participant& message, const bus::PeerId& peer,
     recorder.process = &sender;
     recorder.peer = peer;
     recorder.heard = server_.awake();
+    recorder.arrived = now;
   }
   if (message.role() != ParticipantRole::ROLE_CONTROLLER) return;
   Client& client = clients_[sender.name()];

@@ -60,6 +60,11 @@ class FlightWatch {
   /// The run fails with `reason`. False if it is none of those that participants cause.
   bool on_failed(const std::string& reason, Instant now);
   const config::Sync& sync() const { return sync_; }
+  /// When a recorder's announcement came last; 0 if none did.
+  Instant find_heard(const std::string& recorder) const {
+    const auto known = recorders_.find(recorder);
+    return known == recorders_.end() ? Instant(0) : known->second.arrived;
+  }
   void on_interrupted();
   void on_status(const SimStatus& status) { status_.on_status(status); }
   /// The server says `line`.
@@ -97,8 +102,9 @@ class FlightWatch {
   struct Recorder {
     const Process* process = nullptr;
     bus::PeerId peer;
-    Instant ready{0};  // its first announcement that says so; 0: it does not
-    Instant heard{0};  // awake time of the server
+    Instant ready{0};    // its first announcement that says so; 0: it does not
+    Instant heard{0};    // awake time of the server
+    Instant arrived{0};  // time of the world
   };
   /// Steps in a row that a vehicle was flown without an answer.
   struct Lacking {

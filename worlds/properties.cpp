@@ -240,9 +240,12 @@ void Properties::check_problem(const SimStatus& status) {
     const std::string name = problem.substr(quote + 1, problem.find('\'', quote + 1) - quote - 1);
     const auto known = announced_.find(name);
     if (known == announced_.end() || !known->second.is_honest) continue;
-    // One that dies before it repeats its announcement may be one that need not.
-    const auto killed = killed_.find(name);
-    if (killed != killed_.end() && killed->second - known->second.since < kRepeatsWithin) continue;
+    // One that falls silent before it repeats its announcement may be one that need not.
+    const auto is_soon = [&, since = known->second.since](const auto& times) {
+      const auto time = times.find(name);
+      return time != times.end() && time->second - since < kRepeatsWithin;
+    };
+    if (is_soon(killed_) || is_soon(stopped_)) continue;
     const std::string& host = runs_.at(status.run_id()).server->process().host().name();
     const std::size_t got = problem.rfind("got ");
     const bool is_true = holds("source timestamp") ? !holds((" on " + host + ":").c_str())
@@ -265,8 +268,9 @@ bool Properties::is_of_other_run(const std::string& run_id, const SimStatus& sta
 int Properties::count_living(const Run& run, const std::set<std::string>& names) const {
   return static_cast<int>(std::count_if(names.begin(), names.end(), [&](const auto& name) {
     const auto killed = killed_.find(name);
-    return killed == killed_.end() ||
-           timeline_.now() - std::max(killed->second, run.disturbed) < kGoneAfter;
+    if (killed == killed_.end()) return true;
+    const Instant heard = run.flight->find_heard(name);
+    return timeline_.now() - std::max({killed->second, run.disturbed, heard}) < kGoneAfter;
   }));
 }
 
@@ -620,7 +624,9 @@ void Properties::check_end(const Program& server,
   if (server.was_killed() || server.was_interrupted() || !server.exit_code()) return;
   for (const auto& [run_id, run] : runs_) {
     if (run.server != &server || !run.is_finished) continue;
-    Instant last = run.ended;
+    const auto continued = continued_.find(server.name());
+    Instant last =
+        std::max(run.ended, continued == continued_.end() ? run.ended : continued->second);
     for (const auto& program : programs) {
       const bool took_part =
           run.recorders.count(program->name()) > 0 || run.done.count(program->name()) > 0;

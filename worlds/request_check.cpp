@@ -8,6 +8,7 @@ namespace sls::worlds {
 namespace {
 
 constexpr std::size_t kKept = 64;
+constexpr const char* kEnded = "the run has ended: ";
 
 std::string name_operator(std::string name) {
   std::replace_if(
@@ -39,7 +40,7 @@ void RequestCheck::on_request(const SimControl& request, bool is_of_other) {
 
 /// The begin of the reason why it is refused; empty if it is accepted.
 std::string RequestCheck::judge(const SimControl& request) const {
-  if (is_over_) return "the run has ended: ";
+  if (is_over_) return kEnded;
   const std::string busy = stepping_ ? "a step request is being carried out: " : "";
   switch (request.action()) {
     case ControlAction::ACTION_PAUSE:
@@ -115,6 +116,12 @@ void RequestCheck::on_recorded(std::uint64_t step) {
 }
 
 void RequestCheck::on_reply(const SimControlReply& reply) {
+  // The end of the run came before the request for steps.
+  if (stepping_ && reply.request_id() == stepping_->key.request_id &&
+      reply.reason().to_string().rfind(kEnded, 0) == 0) {
+    is_over_ = true;
+    return stepping_.reset();
+  }
   if (!replies_.empty()) {
     check(reply, replies_.front());
     return replies_.pop_front();
@@ -138,7 +145,7 @@ void RequestCheck::check(const SimControlReply& reply, const Expected& expected)
                        std::count(vehicle_ids_.begin(), vehicle_ids_.end(), reply.vehicle_id()) > 0;
   if (is_ours && is_right) return;
   // The run may have ended meanwhile, in the last of the steps, too.
-  if (is_ours && reason.rfind("the run has ended: ", 0) == 0) return void(is_over_ = true);
+  if (is_ours && reason.rfind(kEnded, 0) == 0) return void(is_over_ = true);
   if (is_ours && expected.done > 0 &&
       is_cut_short(reply, expected.key, expected.step - expected.done, expected.done))
     return;
