@@ -237,8 +237,9 @@ const Row kRows[] = {
     {"AControllerOfAnotherServerIsNotOurs",
      "members 1 run=cd vehicles=7 scenario=, 2 run=0 vehicles=8 | server cd 7 | deadline 1 " +
          kDeadline + " | deadline 2 " + kDeadline + " | look 0 none | look 5000 none"},
-    {"OfADeadOneNothingIsReported",
-     "members 1 run=cd silent | other-run 5 5 run=cd | look 0 none | look 9000 none"},
+    {"TheDeadAndTheDoneAreNotAccused",
+     "members 1 run=cd silent, 2 run=cd done | other-run 5 5 run=cd | look 0 none | look 9000 "
+     "none"},
     {"UnknownVehiclesAreReportedOnceTheyLast",
      "members 1 vehicles=1+7+8+20 | server cd 20 | look 0 none | look 4000 " + kField +
          "vehicle_ids: expected 0-1, got 7-8 | members 1 vehicles= | look 5000 none | look 9000 " +

@@ -125,6 +125,11 @@ TEST(ServerLockstepTest, AnAnswerOfNoVehicleIsASignOfLife) {
 TEST(ServerLockstepTest, TheAnswerThatEndsTheMissionEndsTheRun) {
   ServerRig rig;
   rig.join("pilot");
+  rig.fly_to(100);
+  rig.request(ControlAction::ACTION_PAUSE);
+  rig.answer("pilot", 101);
+  rig.wait(500'000);
+  rig.request(ControlAction::ACTION_RESUME);
   rig.fly_to(249);
   rig.take_records();
   ServerRig::Answer last{250};
@@ -135,7 +140,9 @@ TEST(ServerLockstepTest, TheAnswerThatEndsTheMissionEndsTheRun) {
   EXPECT_EQ(rig.status().phase(), RunPhase::PHASE_FINISHED);
   EXPECT_EQ(rig.status().step(), 250u);
   EXPECT_EQ(rig.status().timing().to_string(), "exact");
-  EXPECT_NE(rig.take_log().back().find("finished: 250 steps, 1 s simulated"), std::string::npos);
+  EXPECT_NE(rig.take_log().back().find("finished: 250 steps, 1 s simulated in 0.00 s"),
+            std::string::npos)
+      << "a pause is no flying time";
 }
 
 TEST(ServerLockstepTest, ARefusedAnswerOfTheOnlyClientFailsTheRun) {
@@ -563,7 +570,11 @@ TEST(ServerLockstepTest, InAPauseNobodyIsSilent) {
 TEST(ServerLockstepTest, APausedRunFliesTheStepsThatAreRequested) {
   ServerRig rig;
   rig.join("pilot");
+  rig.take_log();
   rig.request(ControlAction::ACTION_PAUSE);
+  EXPECT_EQ(rig.take_log(), Lines{"0: step 0: paused by anna@box"});
+  rig.request(ControlAction::ACTION_PAUSE);
+  EXPECT_EQ(rig.take_log(), Lines()) << "a refused request is no event";
   EXPECT_EQ(rig.phase(), Phase::kAwaitingAnswers) << "the step in work is completed";
   rig.answer("pilot", 0);
   EXPECT_EQ(rig.phase(), Phase::kResting);
@@ -572,7 +583,7 @@ TEST(ServerLockstepTest, APausedRunFliesTheStepsThatAreRequested) {
   rig.request(ControlAction::ACTION_STEP, 2);
   rig.fly_to(2);
   EXPECT_EQ(rig.phase(), Phase::kResting);
-  ASSERT_EQ(rig.replies().size(), 2u);
+  ASSERT_EQ(rig.replies().size(), 3u);
   EXPECT_TRUE(rig.replies().back().accepted());
   EXPECT_EQ(rig.replies().back().step(), 3u);
   rig.request(ControlAction::ACTION_RESUME);
