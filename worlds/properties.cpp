@@ -32,8 +32,8 @@ constexpr Instant kBeginsWithin = 60ms;
 constexpr Instant kHeardWithin = 2s;
 /// The same over links that lose most: statuses come in their order.
 constexpr Instant kKnownWithin = 10s;
-/// Characters of a problem in a status (idl/sls.idl); a longer one is cut.
-constexpr std::size_t kMostProblem = 255;
+/// Bytes of a reason or problem in a status (idl/sls.idl); a longer one ends with "..." there.
+constexpr std::size_t kMostText = 255;
 /// A program is known to repeat its announcement.
 constexpr Instant kRepeatsWithin = 3s;
 /// Time for which a server in real time asks for the last answers (sim::RealtimePacing).
@@ -232,7 +232,7 @@ void Properties::check_problem(const SimStatus& status) {
   for (std::size_t begin = 0; begin < text.size();) {
     const std::size_t end = std::min(text.size(), text.find("; ", begin));
     const std::string problem = text.substr(begin, end - begin);
-    const bool is_whole = end < text.size() || text.size() < kMostProblem;
+    const bool is_whole = end < text.size() || text.size() < kMostText;
     begin = end + 2;
     const auto holds = [&](const char* part) { return problem.find(part) != problem.npos; };
     const std::size_t quote = problem.find('\'');
@@ -343,9 +343,10 @@ void Properties::check_client_end(const Program& client) {
   const auto run = runs_.find(joined_[client.name()]);
   static const std::string kFailed = "the run failed: ";
   if (reason.rfind(kFailed, 0) == 0) {
+    const std::string said = reason.substr(kFailed.size(), kMostText - 6);  // the rest may be cut
     if (run == runs_.end() || !run->second.has_ended || run->second.is_finished)
       finds("it did not");
-    else if (run->second.failure.rfind(reason.substr(kFailed.size()), 0) != 0)  // it may be cut
+    else if (run->second.failure.rfind(said, 0) != 0)
       finds("that is not why: " + run->second.failure);
   } else if (reason.find("expected it to finish") != std::string::npos && run != runs_.end()) {
     const auto heard = client.find_heard(run->first, run->second.server->id());

@@ -7,7 +7,7 @@
 namespace sls::worlds {
 namespace {
 
-constexpr std::size_t kKept = 64;
+constexpr std::size_t kKept = 64;  // replies, for requests that come again
 constexpr const char* kEnded = "the run has ended: ";
 
 std::string name_operator(std::string name) {

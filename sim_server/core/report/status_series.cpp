@@ -1,8 +1,21 @@
 #include "sim_server/core/report/status_series.hpp"
 
 #include <algorithm>
+#include <string>
 
 namespace sls::sim {
+namespace {
+
+/// `text` as sls/status can hold it: a longer one ends with "...", between two letters of UTF-8.
+std::string fit(const std::string& text) {
+  constexpr std::size_t kMost = 255;  // bytes, idl/sls.idl
+  if (text.size() <= kMost) return text;
+  std::size_t end = kMost - 3;
+  while (end > 0 && (static_cast<unsigned char>(text[end]) & 0xc0u) == 0x80u) --end;
+  return text.substr(0, end) + "...";
+}
+
+}  // namespace
 
 void RoundTrips::add(Duration round_trip) {
   values_[next_] = round_trip;
@@ -32,14 +45,14 @@ SimStatus StatusSeries::make(const Content& content, sync::Time now) {
   sample.vehicle_id(vehicle_id_);
   sample.sample_index(size_++);
   sample.phase(content.phase);
-  sample.reason(content.reason);
+  sample.reason(fit(content.reason));
   sample.step(content.step);
   sample.controller_name(content.controller_name);
   sample.real_time_factor(wall_s > 0.0 ? simulated_s / wall_s : 0.0);
   sample.round_trip_p50_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(50).count()));
   sample.round_trip_p99_ns(static_cast<std::uint64_t>(round_trips.calc_percentile(99).count()));
   sample.timing(timing.label());
-  sample.problem(content.problem);
+  sample.problem(fit(content.problem));
   sample.counters(counters);
   return sample;
 }

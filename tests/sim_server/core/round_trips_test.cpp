@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+#include <utility>
+
 namespace sls::sim {
 namespace {
 
@@ -49,6 +52,20 @@ TEST(RoundTripsTest, AskingChangesNothing) {
   trips.add(2000ns);  // replaces the oldest, 1000 ns
   EXPECT_EQ(trips.calc_percentile(100), 2000ns);
   EXPECT_EQ(trips.calc_percentile(99), 990ns);
+}
+
+TEST(StatusSeriesTest, ATextThatIsTooLongEndsWithDotsBetweenTwoLetters) {
+  const std::string most(255, 'x'), letters = std::string(251, 'x') + "\xc3\xa4";  // "ä"
+  StatusSeries series(1, 0, {});
+  StatusSeries::Content content;
+  for (const auto& [text, expected] : {std::pair(most, most),
+                                       {most + "y", std::string(252, 'x') + "..."},
+                                       {letters + "and more", std::string(251, 'x') + "..."}}) {
+    content.reason = content.problem = text;
+    const SimStatus status = series.make(content, {});
+    EXPECT_EQ(status.reason().to_string(), expected);
+    EXPECT_EQ(status.problem().to_string(), expected);
+  }
 }
 
 }  // namespace
