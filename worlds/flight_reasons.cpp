@@ -155,7 +155,7 @@ int FlightWatch::count_recorders(Instant now) const {
       std::count_if(recorders_.begin(), recorders_.end(), [&](const auto& item) {
         const Recorder& recorder = item.second;
         return recorder.ready > Instant(0) && !recorder.process->has_ended() &&
-               recorder.ready + kReadySince < now &&
+               std::max(recorder.ready, recorder.back) + kReadySince < now &&
                server_.awake() - recorder.heard < kHeardSince &&
                server_.peer().matched_writers(TopicId::kParticipant).count(recorder.peer) > 0;
       }));

@@ -16,7 +16,8 @@ namespace {
 using namespace std::chrono_literals;
 
 /// A server looks at its participants ten times a second.
-constexpr Instant kKnownAfter = 500ms;
+constexpr Instant kLookInterval = 100ms;
+constexpr Instant kKnownAfter = 5 * kLookInterval;
 /// It looks for a stop signal every 20 ms, between two requests.
 constexpr Instant kObeysWithin = 1s;
 constexpr Instant kGivesUpWithin = 2s;
@@ -76,6 +77,7 @@ void FlightWatch::on_member(const Participant& message, const bus::PeerId& peer,
     recorder.process = &sender;
     recorder.peer = peer;
     recorder.heard = server_.awake();
+    if (now - recorder.arrived >= kForgottenAfter) recorder.back = now;
     recorder.arrived = now;
   }
   if (message.role() != ParticipantRole::ROLE_CONTROLLER) return;
@@ -129,9 +131,10 @@ void FlightWatch::on_request(ControlAction action) {
 
 void FlightWatch::on_published(std::uint64_t step, Instant now) {
   const auto disobeys = [&](const std::optional<Instant>& since, const char* what) {
-    if (since && !is_disturbed() && server_.awake() - *since > kObeysWithin)
-      find_(fmt::format("obeys: step {} leaves {:.3f} s after {}", step,
-                        sync::to_seconds(server_.awake() - *since), what));
+    const Instant waited = server_.awake() - std::max(since.value_or(disturbed_), disturbed_);
+    if (since && !is_disturbed() && waited > kObeysWithin)
+      find_(fmt::format("obeys: step {} leaves {:.3f} s after {}", step, sync::to_seconds(waited),
+                        what));
   };
   disobeys(interrupted_, "SIGINT");
   disobeys(stop_requested_, "an operator's stop");
@@ -285,7 +288,8 @@ std::optional<Instant> FlightWatch::check_flyer(const model::StepRecord& record,
       find_(fmt::format("take-over: '{}' flies step {} after {:.3f} s without '{}'",
                         record.client_name, record.step, sync::to_seconds(waited), name));
   }
-  return std::max(answer->second, given_up);
+  // The answer of a client that fell silent counts when the server sees that it is back.
+  return std::max({answer->second, given_up, flyer->second.back + kLookInterval});
 }
 
 /// The clients of the vehicle before `flyer`, by name, the strongest first.

@@ -105,6 +105,7 @@ class FlightWatch {
     Instant ready{0};    // its first announcement that says so; 0: it does not
     Instant heard{0};    // awake time of the server
     Instant arrived{0};  // time of the world
+    Instant back{0};     // the first one after a long silence
   };
   /// Steps in a row that a vehicle was flown without an answer.
   struct Lacking {
