@@ -43,8 +43,7 @@ class RequestCheck {
     bool is_accepted = false;
     std::string reason;      ///< its begin
     std::uint64_t step = 0;  ///< of the run
-    std::uint64_t done =
-        0;  ///< steps of a request for steps, which the end of the run may cut short
+    std::uint64_t done = 0;  ///< steps of a request for steps; the end of the run may come first
   };
   struct StepRequest {
     Key key;
