@@ -81,13 +81,13 @@ class ServerCore {
   void on_failure(const std::string& reason, sync::Time now);
 
   /// The main thread has woken: looks, calls `deliver(core)` for what waits, and goes on, in the
-  /// order that the rules need. `now()`: the time.
-  template <class Deliver, class Clock>
-  void on_wake(Surroundings& around, const Deliver& deliver, const Clock& now) {
-    if (has_news(around)) on_look(around, now());
+  /// order that the rules need. `read_clock()`: the time.
+  template <class Deliver, class ReadClock>
+  void on_wake(Surroundings& around, const Deliver& deliver, const ReadClock& read_clock) {
+    if (has_news(around)) on_look(around, read_clock());
     deliver(*this);
-    on_time(now());
-    if (const sync::Time time = now(); is_look_due(time)) on_look(around, time);
+    on_time(read_clock());
+    if (const sync::Time time = read_clock(); is_look_due(time)) on_look(around, time);
   }
   /// True if answers may be given to the core as they come, not only when the main thread wakes.
   bool takes_answers_at_once(const Surroundings& around) const {
