@@ -29,7 +29,7 @@ void CoreLoop::run(ServerCore& core) {
     main_wants_core_ = false;
     if (const auto time = now(); is_late && !core.is_look_due(time)) unanswered_ = time;
     core.on_wake(
-        around_, [this](ServerCore& woken) { deliver_events(woken); }, now);
+        around_, [&] { deliver_events(core); }, now);
   }
   core_ = nullptr;
   lock.unlock();

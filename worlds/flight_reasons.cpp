@@ -142,10 +142,16 @@ void FlightWatch::check_early(const std::string& reason, Instant since, double d
         fmt::format("reason: {}, but only {:.3f} s have passed", reason, sync::to_seconds(waited)));
 }
 
+/// It has been ready, and heard without a long silence, for a while.
+bool FlightWatch::is_present(const Heard& participant, Instant now) const {
+  return !participant.process->has_ended() &&
+         std::max(participant.ready, participant.back) + kReadySince < now &&
+         server_.awake() - participant.heard_awake < kHeardSince;
+}
+
 bool FlightWatch::is_there(const Client& client, Instant now) const {
   const bus::PeerId& peer = std::get<bus::PeerId>(client.order);
-  return client.is_ready && !client.process->has_ended() && client.ready + kReadySince < now &&
-         client.back + kReadySince < now && server_.awake() - client.heard_awake < kHeardSince &&
+  return client.is_ready && is_present(client, now) &&
          server_.peer().matched_readers(TopicId::kState).count(peer) > 0 &&
          server_.peer().matched_writers(TopicId::kCommand).count(peer) > 0;
 }
@@ -154,9 +160,7 @@ int FlightWatch::count_recorders(Instant now) const {
   return static_cast<int>(
       std::count_if(recorders_.begin(), recorders_.end(), [&](const auto& item) {
         const Recorder& recorder = item.second;
-        return recorder.ready > Instant(0) && !recorder.process->has_ended() &&
-               std::max(recorder.ready, recorder.back) + kReadySince < now &&
-               server_.awake() - recorder.heard < kHeardSince &&
+        return recorder.ready > Instant(0) && is_present(recorder, now) &&
                server_.peer().matched_writers(TopicId::kParticipant).count(recorder.peer) > 0;
       }));
 }

@@ -49,9 +49,10 @@ FlightWatch::FlightWatch(const config::Scenario& scenario, std::uint64_t run_id,
       status_(sync_, server, find_),
       requests_(run_id_, vehicle_ids_, find_) {}
 
-void FlightWatch::Client::hear(Instant now) {
+void FlightWatch::Heard::hear(Instant now, Instant awake) {
   if (now - heard >= kForgottenAfter) back = now;
   heard = now;
+  heard_awake = awake;
 }
 
 // --- arrives at the server -----------------------------------------------------------------------
@@ -76,9 +77,7 @@ void FlightWatch::on_member(const Participant& message, const bus::PeerId& peer,
     if (!is_ready || recorder.ready == Instant(0)) recorder.ready = is_ready ? now : Instant(0);
     recorder.process = &sender;
     recorder.peer = peer;
-    recorder.heard = server_.awake();
-    if (now - recorder.arrived >= kForgottenAfter) recorder.back = now;
-    recorder.arrived = now;
+    recorder.hear(now, server_.awake());
   }
   if (message.role() != ParticipantRole::ROLE_CONTROLLER) return;
   Client& client = clients_[sender.name()];
@@ -93,16 +92,14 @@ void FlightWatch::on_member(const Participant& message, const bus::PeerId& peer,
   peers_.insert(peer);
   has_libraries_ = has_libraries_ || message.library_sha256().size() > 0;
   client.vehicle_ids.assign(message.vehicle_ids().begin(), message.vehicle_ids().end());
-  client.hear(now);
-  client.heard_awake = server_.awake();
+  client.hear(now, server_.awake());
   if (is_ready) rightful_.insert(sender.name());
 }
 
 void FlightWatch::on_answers(const Commands& sample, const Process& sender, Instant now) {
   Client& client = clients_[sender.name()];
   client.process = &sender;
-  client.hear(now);
-  client.heard_awake = server_.awake();
+  client.hear(now, server_.awake());
   for (const ControlCommand& command : sample.vehicles())
     client.has_erred = client.has_erred || !is_sound(command, sample.step());
   if (sample.run_id() != run_id_ || !has_begun_ || sample.step() != step_) return;

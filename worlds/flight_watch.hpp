@@ -63,7 +63,7 @@ class FlightWatch {
   /// When a recorder's announcement came last; 0 if none did.
   Instant find_heard(const std::string& recorder) const {
     const auto known = recorders_.find(recorder);
-    return known == recorders_.end() ? Instant(0) : known->second.arrived;
+    return known == recorders_.end() ? Instant(0) : known->second.heard;
   }
   void on_interrupted();
   void on_status(const SimStatus& status) { status_.on_status(status); }
@@ -76,22 +76,26 @@ class FlightWatch {
   void on_disturbed();
 
  private:
-  struct Client {
+  /// A participant, as the server hears it.
+  struct Heard {
     const Process* process = nullptr;
-    std::tuple<std::int32_t, std::string, bus::PeerId> order;  // the first one is the strongest
-    std::vector<std::uint32_t> vehicle_ids;
-    bool is_ready = false;
-    Instant ready{0};        // its first announcement that says so
-    Instant left{0};         // its first one after that which does not
+    Instant ready{0};        // its first announcement that says so; 0: none does
     Instant heard{0};        // its last sample
     Instant heard_awake{0};  // the same in awake time of the server
     Instant back{0};         // the first one after a long silence
+
+    void hear(Instant now, Instant awake);
+  };
+  struct Client : Heard {
+    std::tuple<std::int32_t, std::string, bus::PeerId> order;  // the first one is the strongest
+    std::vector<std::uint32_t> vehicle_ids;
+    bool is_ready = false;
+    Instant left{0};  // its first one after that which does not
     std::uint64_t answered_step = 0;
     std::map<std::uint32_t, Instant> answers;  // the first ones to that step, by vehicle
     std::map<std::uint32_t, Instant> refused;  // the first defective ones to it
     bool has_erred = false;                    // one of its answers was defective
 
-    void hear(Instant now);
     bool has_answered(std::uint32_t vehicle, std::uint64_t step) const {
       return answered_step == step && answers.count(vehicle) > 0;
     }
@@ -99,13 +103,8 @@ class FlightWatch {
       return answered_step == step && refused.count(vehicle) > 0;
     }
   };
-  struct Recorder {
-    const Process* process = nullptr;
+  struct Recorder : Heard {
     bus::PeerId peer;
-    Instant ready{0};    // its first announcement that says so; 0: it does not
-    Instant heard{0};    // awake time of the server
-    Instant arrived{0};  // time of the world
-    Instant back{0};     // the first one after a long silence
   };
   /// Steps in a row that a vehicle was flown without an answer.
   struct Lacking {
@@ -131,6 +130,7 @@ class FlightWatch {
                   Instant now);
   void check_absence(const std::string& reason, const std::string& named, Instant now);
   void check_early(const std::string& reason, Instant since, double deadline_s);
+  bool is_present(const Heard& participant, Instant now) const;
   bool is_there(const Client& client, Instant now) const;
   int count_recorders(Instant now) const;
   std::vector<const Client*> find_clients(const std::string& announced_name) const;

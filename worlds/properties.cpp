@@ -626,9 +626,9 @@ void Properties::check_end(const Program& server,
   if (server.was_killed() || server.was_interrupted() || !server.exit_code()) return;
   for (const auto& [run_id, run] : runs_) {
     if (run.server != &server || !run.is_finished) continue;
+    Instant last = run.ended;
     const auto continued = continued_.find(server.name());
-    Instant last =
-        std::max(run.ended, continued == continued_.end() ? run.ended : continued->second);
+    if (continued != continued_.end()) last = std::max(last, continued->second);
     for (const auto& program : programs) {
       const bool took_part =
           run.recorders.count(program->name()) > 0 || run.done.count(program->name()) > 0;

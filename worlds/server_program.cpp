@@ -89,7 +89,7 @@ void ServerProgram::wake() {
   write_waiting();
   if (core_->phase() != sim::ServerCore::Phase::kEnded)
     core_->on_wake(
-        *this, [this](sim::ServerCore&) { deliver_events(); }, [this] { return now(); });
+        *this, [this] { deliver_events(); }, [this] { return now(); });
   if (core_->phase() == sim::ServerCore::Phase::kEnded) end_run();
   if (!process_.has_ended()) wake_at(leaving_ ? now() : core_->next_deadline());
 }

@@ -80,12 +80,12 @@ class ServerCore {
   /// published, or the run after a reset not be made.
   void on_failure(const std::string& reason, sync::Time now);
 
-  /// The main thread has woken: looks, calls `deliver(core)` for what waits, and goes on, in the
+  /// The main thread has woken: looks, calls `deliver()` for what waits, and goes on, in the
   /// order that the rules need. `read_clock()`: the time.
   template <class Deliver, class ReadClock>
   void on_wake(Surroundings& around, const Deliver& deliver, const ReadClock& read_clock) {
     if (has_news(around)) on_look(around, read_clock());
-    deliver(*this);
+    deliver();
     on_time(read_clock());
     if (const sync::Time time = read_clock(); is_look_due(time)) on_look(around, time);
   }

@@ -240,7 +240,7 @@ class ServerRig : public Outputs, public Surroundings {
   }
   void look() {
     core_->on_wake(
-        *this, [](ServerCore&) {}, [this] { return now_; });
+        *this, [] {}, [this] { return now_; });
   }
   std::string stamp(const std::string& text) const { return fmt::format("{}: {}", ms(), text); }
 
