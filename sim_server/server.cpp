@@ -63,7 +63,7 @@ void Server::run() {
     }
   }
   if (core->is_known()) linger(*core);
-  if (core->end() == ServerCore::End::kFailed) throw app::RunError(core->error());
+  if (!core->error().empty()) throw app::RunError(core->error());
 }
 
 std::unique_ptr<ServerCore> Server::make_core(ServerCore::Start start) {

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "worlds/flight_watch.hpp"
-#include "worlds/program.hpp"
+#include "worlds/server_program.hpp"
 
 /// Judges the reason of a failed run by what has arrived at its server. A participant that the
 /// reason names as missing must be missing, and for as long as the scenario says.
@@ -51,6 +51,9 @@ bool FlightWatch::on_failed(const std::string& reason, Instant now) {
     // on_yielded judges it.
   } else if (reason.rfind("stopped by ", 0) == 0) {
     if (!stop_requested_) find_("reason: " + reason + ", but nobody has asked for it");
+  } else if (reason == "write refused") {
+    if (!static_cast<const ServerProgram&>(server_).has_been_refused())
+      find_("reason: " + reason + ", but none was");
   } else if (reason.rfind("not ready within ", 0) == 0) {
     check_start(reason, now);
   } else if (!waited.empty()) {

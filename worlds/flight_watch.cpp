@@ -46,7 +46,7 @@ FlightWatch::FlightWatch(const config::Scenario& scenario, std::uint64_t run_id,
       vehicle_ids_(std::move(vehicle_ids)),
       began_(server.awake()),
       find_(std::move(find)),
-      status_(sync_, server, find_),
+      status_(sync_, vehicle_ids_.size(), server, find_),
       requests_(run_id_, vehicle_ids_, find_) {}
 
 void FlightWatch::Heard::hear(Instant now, Instant awake) {
@@ -160,9 +160,10 @@ void FlightWatch::on_disturbed() {
 
 void FlightWatch::on_interrupted() { interrupted_ = server_.awake(); }
 
-/// The library of the first client decides who may fly, and the memory of a server.
+/// The library of the first client decides who may fly, and what a server remembers and discovers.
 bool FlightWatch::is_unclear() const {
-  return has_libraries_ || peers_.size() >= sync::Membership::kMostMembers;
+  return has_libraries_ || server_.peer().has_short_memory() ||
+         peers_.size() >= sync::Membership::kMostMembers;
 }
 
 bool FlightWatch::is_disturbed() const { return is_disturbed_ || server_.is_slow(); }

@@ -159,22 +159,61 @@ void Network::leave(Peer& peer, bool with_goodbye) {
     if (&other->process() == &peer.process() || other->process().has_ended()) continue;
     const bool is_heard = with_goodbye && !is_lost(peer, *other);
     if (!is_heard) missed_leaves_.insert({other->id(), peer.id()});
-    const Instant delay = is_heard ? draw_delay(peer, *other) : kLease;
-    timeline_.after(delay, [this, &peer, other = other.get()] {
-      other->process().run([this, &peer, other] { forget(*other, peer); });
+    const Instant delay = is_heard ? draw_delay(peer, *other) : lease_;
+    timeline_.after(delay, [this, &peer, is_heard, other = other.get()] {
+      other->process().run([this, &peer, is_heard, other] { forget(*other, peer, !is_heard); });
     });
   }
 }
 
-void Network::forget(Peer& observer, const Peer& observed) {
+void Network::forget(Peer& observer, const Peer& observed, bool is_by_lease) {
+  if (is_by_lease && lease_ < kLease) observer.has_short_memory_ = true;
   observer.known_.erase(observed.id());
   observer.missing_deadlines_.erase(observed.id());
   for (std::size_t topic = 0; topic < kTopics; ++topic) {
     observer.writers_[topic].erase(observed.id());
     observer.reader_peers_[topic].erase(observed.id());
-    channel(observer, observed, topic) = {};
-    channel(observed, observer, topic) = {};
+    Channel& out = channel(observer, observed, topic);
+    Channel& in = channel(observed, observer, topic);
+    out.writer_knows = in.reader_knows = false;
+    // After another discovery what has not arrived is sent again, and nothing arrives twice.
+    out.next = out.delivered + 1;
+    in.next = in.delivered + 1;
   }
+}
+
+void Network::set_lease(Instant lease) {
+  lease_ = lease;
+  if (lease < kLease) timeline_.after(kDiscoveryRepeat, [this] { expire_leases(); });
+}
+
+/// Each running peer hears the announcements of the others, or forgets those whose lease is over,
+/// until it discovers them again. Of one that was stopped itself, either comes first.
+void Network::expire_leases() {
+  for (const auto& observer : peers_)
+    for (const auto& observed : peers_) {
+      const auto known = observer->known_.find(observed->id());
+      if (known == observer->known_.end() || observer->process().has_ended() ||
+          observer->process().is_stopped() || observed->process().has_ended())
+        continue;
+      Instant& heard = observer->heard_.emplace(observed->id(), known->second).first->second;
+      heard = std::max(heard, known->second);
+      const bool is_over = timeline_.now() - heard > lease_;
+      const bool is_heard =
+          !observed->process().is_stopped() && !is_lost(*observed, *observer) &&
+          link(observed->process().host(), observer->process().host()).stalled_until <=
+              timeline_.now();
+      if (is_over && (!is_heard || random_.chance(0.5))) {
+        forget(*observer, *observed, true);
+        timeline_.after(kDiscoveryRepeat,
+                        [this, observer = observer.get(), observed = observed.get()] {
+                          discover(*observer, *observed);
+                        });
+      } else if (is_heard) {
+        heard = timeline_.now();
+      }
+    }
+  timeline_.after(kDiscoveryRepeat, [this] { expire_leases(); });
 }
 
 // --- samples -------------------------------------------------------------------------------------

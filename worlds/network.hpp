@@ -103,8 +103,10 @@ class Peer {
   }
   /// Peers with a writer that lacks the deadline that our reader asks for.
   const std::set<bus::PeerId>& missing_deadlines() const { return missing_deadlines_; }
-  /// The peers that it has discovered, and when.
+  /// The peers that it has discovered, and when; again after a lease.
   const std::map<bus::PeerId, Instant>& known() const { return known_; }
+  /// True if a lease that is shorter than usual has ended here, of a living or a dead peer.
+  bool has_short_memory() const { return has_short_memory_; }
   bool is_acknowledged(TopicId topic) const;
   /// Deadlines without a sample, from the first sample on.
   std::uint64_t missed_deadlines(TopicId topic);
@@ -153,6 +155,8 @@ class Peer {
   std::array<std::set<bus::PeerId>, kTopics> writers_, reader_peers_;
   std::map<bus::PeerId, Instant> known_;
   std::set<bus::PeerId> missing_deadlines_;
+  bool has_short_memory_ = false;
+  std::map<bus::PeerId, Instant> heard_;  // the last announcement, where leases are short
 };
 
 class Network {
@@ -161,11 +165,13 @@ class Network {
 
   /// Batches of sls/record that a writer keeps.
   void set_record_history(std::size_t batches) { record_history_ = batches; }
+  /// Before peers join. With one that is shorter than `kLease` the living are forgotten, too.
+  void set_lease(Instant lease);
 
   Link& link(const Host& from, const Host& to) { return links_[{&from, &to}]; }
   /// Longest time between two announcements of a participant.
   static constexpr Instant kDiscoveryRepeat = std::chrono::milliseconds(500);
-  /// A participant that left without goodbye is forgotten after this.
+  /// A participant that was not heard for this time is forgotten.
   static constexpr Instant kLease = std::chrono::seconds(60);
   static constexpr Instant kHeartbeat = std::chrono::milliseconds(50);
   /// The queue before a link; what does not fit is lost.
@@ -205,7 +211,8 @@ class Network {
   }
   void discover(Peer& observer, Peer& observed);
   void match(Peer& observer, Peer& observed, const Peer::Endpoint& endpoint);
-  void forget(Peer& observer, const Peer& observed);
+  void forget(Peer& observer, const Peer& observed, bool is_by_lease);
+  void expire_leases();
   void sent(Peer& writer, std::size_t topic);
   void send_now(Peer& writer, Peer& reader, std::size_t topic, const Peer::Written& sample);
   void send_reliably(Peer& writer, Peer& reader, std::size_t topic);
@@ -224,6 +231,7 @@ class Network {
   std::optional<Instant> last_full_;
   std::uint64_t next_id_ = 1;
   std::size_t record_history_ = 5000;
+  Instant lease_ = kLease;
 };
 
 }  // namespace sls::worlds

@@ -263,6 +263,8 @@ Fault draw_fault(const Plan& plan, Random& random, std::int64_t count) {
       break;
     case Kind::kPartition:
     case Kind::kStall:
+    case Kind::kRefuse:
+    case Kind::kBlock:
       break;
     case Kind::kClog:
       fault.value = random.between(0.3, 4);
@@ -388,6 +390,25 @@ void pause_until_known(Plan& plan, Random& random, bool comes_back) {
   plan.faults.push_back(pause);
 }
 
+/// Runs one after another, each paused for longer than anybody may be absent, then reset. A fault
+/// happens once, so each one has a later step than that of the run before.
+void draw_runs(Plan& plan, Random& random, const FlownScenario& flown) {
+  const std::int64_t runs = random.integer(2, 4);
+  const auto part = static_cast<std::int64_t>(flown.last_step) / (runs + 1);
+  for (std::int64_t i = 0; i < runs; ++i) {
+    Fault request;
+    request.kind = Kind::kRequest;
+    request.step = static_cast<std::uint64_t>(random.integer(i * part, (i + 1) * part - 2));
+    request.other = static_cast<std::size_t>(ControlAction::ACTION_PAUSE);
+    request.duration = draw_seconds(random, 4, 12);
+    plan.faults.push_back(request);
+    request.step = static_cast<std::uint64_t>((i + 1) * part - 1);
+    request.other = static_cast<std::size_t>(ControlAction::ACTION_RESET);
+    plan.faults.push_back(request);
+  }
+  plan.healed = 60s;
+}
+
 /// The one fault of a world with a promise that names it.
 Fault draw_promised(const Plan& plan, Random& random, const FlownScenario& flown) {
   const config::Sync& sync = flown.scenario.sync;
@@ -488,6 +509,30 @@ void draw_lost_recorder(Plan& plan, Random& random, const FlownScenario& flown) 
   pause_until_known(plan, random, false);
 }
 
+/// Writes that are refused or wait, and short leases with a silence that is longer.
+void draw_hindrances(Plan& plan, Random& random, const FlownScenario& flown) {
+  const auto add = [&](Kind kind, std::size_t target, Instant duration) {
+    Fault fault;
+    fault.kind = kind;
+    fault.target = target;
+    fault.duration = duration;
+    time_fault(fault, random, plan, flown);
+    plan.faults.push_back(fault);
+  };
+  if (random.chance(0.04))
+    add(Kind::kRefuse, draw_program(random, plan, Role::kServer), draw_time(random, 1ms, 3s));
+  if (random.chance(0.08))
+    add(Kind::kBlock, draw_program(random, plan, Role::kServer), draw_time(random, 1ms, 5s));
+  if (!random.chance(0.1)) return;
+  plan.lease = draw_time(random, 1s, 4s);
+  const Instant silence = plan.lease + draw_time(random, 0s, 4s);
+  plan.healed += silence;
+  if (random.chance(0.5))
+    add(Kind::kStop, random.index(plan.programs.size()), silence);
+  else
+    add(Kind::kIsolate, random.index(plan.hosts), silence);
+}
+
 /// The faults of a plan that has its programs.
 void draw_faults(Plan& plan, Random& random, const FlownScenario& flown) {
   if (plan.promise == Promise::kCalm || plan.promise == Promise::kTwoServers) return;
@@ -495,6 +540,7 @@ void draw_faults(Plan& plan, Random& random, const FlownScenario& flown) {
     return draw_silences(plan, random, flown);
   if (plan.promise == Promise::kPause) return draw_pause(plan, random, flown);
   if (plan.promise == Promise::kSuspend) return draw_suspension(plan, random, flown);
+  if (plan.promise == Promise::kReset && random.chance(0.5)) return draw_runs(plan, random, flown);
   if (plan.promise > Promise::kMild) {
     plan.faults.push_back(draw_promised(plan, random, flown));
     if (plan.promise == Promise::kRecorderRestart && random.chance(0.5))
@@ -586,6 +632,7 @@ Plan draw_plan(std::uint64_t seed, const std::vector<FlownScenario>& scenarios,
   // Faults then last beyond every deadline.
   if (plan.promise == Promise::kNone && random.chance(0.2))
     plan.healed += draw_time(random, 0s, 30s);
+  if (plan.promise == Promise::kNone) draw_hindrances(plan, random, flown);
   return plan;
 }
 

@@ -34,7 +34,7 @@ struct Fault {
   bool is_of_program() const {
     return kind == Kind::kKill || kind == Kind::kPowerCut || kind == Kind::kStop ||
            kind == Kind::kInterrupt || kind == Kind::kSlow || kind == Kind::kDiskFull ||
-           kind == Kind::kRequest;
+           kind == Kind::kRequest || kind == Kind::kRefuse || kind == Kind::kBlock;
   }
 };
 
@@ -102,6 +102,7 @@ struct Plan {
   double wall_offset_s = 0;
   bool has_files = false;             ///< recorders write real files
   std::size_t record_history = 5000;  ///< batches that a server keeps for late recorders
+  Instant lease = Network::kLease;
   std::vector<Fault> faults;
   /// The faults are over: from now on all that can finish must.
   Instant healed{0};

@@ -315,6 +315,10 @@ void Properties::check_rivals(const Run& run, const Network& network) {
   }
 }
 
+bool Properties::has_been_refused(const Run& run) {
+  return static_cast<const ServerProgram*>(run.server)->has_been_refused();
+}
+
 void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string certificate,
                             const std::string& reason, const Network& network) {
   Run& run = runs_[run_id];
@@ -327,7 +331,7 @@ void Properties::on_run_end(std::uint64_t run_id, bool is_finished, std::string 
   if (run.began) run.summary.duration_s = sync::to_seconds(timeline_.now() - *run.began);
   run.certificate = std::move(certificate);
   run.failure = reason;
-  run.flight->requests().on_end();
+  if (!has_been_refused(run)) run.flight->requests().on_end();
   run.is_failure_judged = reason.empty() || run.flight->on_failed(reason, timeline_.now());
 }
 
@@ -558,7 +562,8 @@ void Properties::check(const Plan& plan, const std::vector<std::unique_ptr<Progr
       find(fmt::format("reason: run {:016x} fails without a cause: {}", run_id, run.failure));
     const bool says_exact =
         run.timing == "exact" || run.timing.find("real-time, 0 of ") != std::string::npos;
-    if (run.has_ended && !run.timing.empty() && says_exact != run.is_exact)
+    if (run.has_ended && !has_been_refused(run) && !run.timing.empty() &&
+        says_exact != run.is_exact)
       find(fmt::format("timing-label: run {:016x} is {}exact, its label says '{}'", run_id,
                        run.is_exact ? "" : "not ", run.timing));
     if (plan.promise == Promise::kCalm && run.began && !run.is_match_late)

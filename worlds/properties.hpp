@@ -166,6 +166,8 @@ class Properties {
   };
 
   void find(std::string finding);
+  /// Its server could not say all that it wanted.
+  static bool has_been_refused(const Run& run);
   void check_problem(const SimStatus& status);
   bool is_of_other_run(const std::string& run_id, const SimStatus& status) const;
   void check_announcement(const Program& program, const Participant& message);

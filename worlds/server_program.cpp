@@ -68,7 +68,7 @@ void ServerProgram::begin_run(sim::ServerCore::Start start) {
                                }),
                 events_.end());
   batches_.emplace(kBatch_bytes, start.run_id);
-  next_batch_ = 0;
+  next_batch_ = lost_ = 0;
   states_.begin_run(start.run_id, scenario.sync.period_ns);
   const Parameters parameters =
       sim::make_parameters_message(start.run_id, vehicle_ids_, scenario, fleet->plant(), "world");
@@ -114,7 +114,11 @@ void ServerProgram::end_run() {
   write_waiting();
   setting_.properties.on_run_end(core_->run_id(), core_->end() == sim::ServerCore::End::kFinished,
                                  certificate_->finish(), core_->error(), setting_.network);
-  if (core_->end() == sim::ServerCore::End::kReset) return begin_run(core_->make_next_start());
+  if (core_->end() == sim::ServerCore::End::kReset) {
+    if (!is_refused_) return begin_run(core_->make_next_start());
+    fail_refused();  // sls/parameters
+    write_waiting();
+  }
   if (core_->error().find("expected no other server") != std::string::npos)
     setting_.properties.on_yielded(*this, core_->run_id(), setting_.network);
   if (!core_->is_known()) return exit(1, core_->error());
@@ -134,8 +138,7 @@ void ServerProgram::linger() {
                      now());
   for (const sync::Line& line : leaving_->take_lines()) say(line);
   if (!is_over) return wake_at(now() + 20ms);
-  const bool has_failed = core_->end() == sim::ServerCore::End::kFailed;
-  const std::string& error = has_failed ? core_->error() : leaving_->error();
+  const std::string& error = core_->error().empty() ? leaving_->error() : core_->error();
   exit(error.empty() ? 0 : 1, error);
 }
 
@@ -143,7 +146,10 @@ void ServerProgram::write_waiting() {
   while (!outbox_.empty()) {
     const Item item = std::move(outbox_.front());
     outbox_.pop_front();
-    if (const auto* status = std::get_if<SimStatus>(&item)) {
+    const bool is_reliable = !std::holds_alternative<sync::Line>(item);
+    if (is_refused_ && is_reliable && !std::holds_alternative<EndRecords>(item)) {
+      fail_refused();
+    } else if (const auto* status = std::get_if<SimStatus>(&item)) {
       setting_.properties.on_status(*status, setting_.network);
       if (setting_.trace.keeps_lines())
         say(fmt::format("status {}: {} step {} {} {}", status->sample_index(),
@@ -160,6 +166,16 @@ void ServerProgram::write_waiting() {
       write_records(true);
     }
   }
+}
+
+void ServerProgram::fail_refused() {
+  has_been_refused_ = true;
+  core_->on_failure("write refused", now());
+}
+
+void ServerProgram::go_on_recording() {
+  if (!std::exchange(is_blocked_, false) || process_.has_ended()) return;
+  process_.run([this] { write_records(false); });
 }
 
 // --- the middleware's thread ---------------------------------------------------------------------
@@ -221,9 +237,14 @@ void ServerProgram::record_late(const sim::Vehicle& vehicle, const sim::OfferedA
 }
 
 void ServerProgram::write_records(bool is_last) {
+  if (is_blocked_ && !is_last) return;
   ++flush_number_;
-  batches_->write(next_batch_, is_last, [this](const RecordBatch& batch) { peer_.write(batch); });
-  written_ += batches_->count();
+  // At its end the thread gives up what still waits.
+  const bool is_lost = is_refused_ || is_blocked_;
+  batches_->write(next_batch_, is_last, [&](const RecordBatch& batch) {
+    if (!is_lost) peer_.write(batch);
+  });
+  (is_lost ? lost_ : written_) += batches_->count();
   batches_->clear();
   steps_ = 0;
 }

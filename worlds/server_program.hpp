@@ -25,8 +25,16 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
                 std::vector<std::uint32_t> vehicle_ids);
   void start() override;
   std::uint64_t run_id() const { return core_ ? core_->run_id() : 0; }
+  /// The middleware refuses samples of reliable topics.
+  void refuse_writes(bool is_refused) { is_refused_ = is_refused; }
+  bool has_been_refused() const { return has_been_refused_; }
+  /// The thread that writes sls/record waits for the middleware.
+  void block_records() { is_blocked_ = true; }
+  void go_on_recording();
 
  private:
+  /// Flights of worlds are short.
+  static constexpr std::size_t kRoomOfBlocked = 128;
   struct EndRecords {};
   using Item = std::variant<SimStatus, SimControlReply, sync::Line, EndRecords>;
   using Event = std::variant<sim::CommandSample, SimControl>;
@@ -38,6 +46,8 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   void take_up(const SimControl& request);
   void write_waiting();
   void write_records(bool is_last);
+  /// A write that a run needs was refused. As CoreLoop and Server do.
+  void fail_refused();
   void end_run();
   void linger();
   bool is_realtime() const {
@@ -51,9 +61,10 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   void record_step(const sim::Fleet& fleet) override;
   void record_late(const sim::Vehicle& vehicle, const sim::OfferedAnswer& answer) override;
   bool is_record_full() const override {
-    return batches_->count() > sim::RecordStream::kMostCollected / 2;
+    return batches_->count() >
+           (is_blocked_ ? kRoomOfBlocked : sim::RecordStream::kMostCollected) / 2;
   }
-  std::uint64_t lost() const override { return 0; }
+  std::uint64_t lost() const override { return lost_; }
   void flush_records() override { write_records(false); }
   void end_records() override { outbox_.push_back(EndRecords()); }
   void send(const SimStatus& status) override { outbox_.push_back(status); }
@@ -95,7 +106,8 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   std::optional<sim::RecordBatches> batches_;
   std::uint64_t next_batch_ = 0;
   std::size_t steps_ = 0;  // of the entries of batches_
-  std::uint64_t written_ = 0;
+  std::uint64_t written_ = 0, lost_ = 0;
+  bool is_refused_ = false, has_been_refused_ = false, is_blocked_ = false;
   std::uint64_t flush_number_ = 0;
   std::optional<sim::Leaving> leaving_;
   std::optional<closed_loop::FlightCertificate> certificate_;

@@ -60,7 +60,7 @@ void StatusCheck::on_status(const SimStatus& status) {
   check_counter("held", said.held(), least.held, counts_.held);
   check_counter("fail_safe", said.fail_safe(), least.fail_safe, counts_.fail_safe);
   // Whom the first flyer took over from has flown no step, and the open step is not recorded.
-  check_counter("take_overs", said.take_overs(), changes_, changes_ + 2 * flyers_.size());
+  check_counter("take_overs", said.take_overs(), changes_, changes_ + 2 * vehicles_);
   const std::string timing = status.timing().to_string();
   // The last step of a flight that is not finished may count, or not.
   const auto holds = [&](const Counts& counts, std::uint64_t steps) {

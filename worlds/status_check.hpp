@@ -20,10 +20,10 @@ class Program;
 
 class StatusCheck {
  public:
-  /// Of a run of `server`. `find`: called with each false statement.
-  StatusCheck(const config::Sync& sync, const Program& server,
+  /// Of a run of `server` with so many vehicles. `find`: called with each false statement.
+  StatusCheck(const config::Sync& sync, std::size_t vehicles, const Program& server,
               std::function<void(std::string)> find)
-      : sync_(sync), server_(server), find_(std::move(find)) {}
+      : sync_(sync), vehicles_(vehicles), server_(server), find_(std::move(find)) {}
 
   void on_published(std::uint64_t step) { step_ = step; }
   void on_resent() { ++resent_; }
@@ -44,6 +44,7 @@ class StatusCheck {
   std::string describe_timing(const Counts& counts, std::uint64_t steps) const;
 
   const config::Sync& sync_;
+  const std::size_t vehicles_;
   const Program& server_;
   const std::function<void(std::string)> find_;
   std::uint64_t step_ = 0;  // the last one published

@@ -45,6 +45,7 @@ class World {
     setting_.folder = folder.string();
     setting_.is_one_machine = plan.hosts == 1;
     setting_.network.set_record_history(plan.record_history);
+    setting_.network.set_lease(plan.lease);
     make_hosts();
     for (std::size_t i = 0; i < plan.programs.size(); ++i) {
       current_.push_back(nullptr);
@@ -189,6 +190,9 @@ class World {
         return fill_disk(fault);
       case Kind::kRequest:
         return request(fault);
+      case Kind::kRefuse:
+      case Kind::kBlock:
+        return hinder_writes(fault);
     }
   }
 
@@ -198,6 +202,22 @@ class World {
     auto* recorder = static_cast<RecorderProgram*>(program);
     recorder->set_disk_full(true);
     setting_.timeline.after(fault.duration, [recorder] { recorder->set_disk_full(false); });
+  }
+
+  void hinder_writes(const Fault& fault) {
+    auto* server = static_cast<ServerProgram*>(current_[fault.target]);
+    if (!server) return;
+    const bool is_refusal = fault.kind == Kind::kRefuse;
+    if (is_refusal)
+      server->refuse_writes(true);
+    else
+      server->block_records();
+    setting_.timeline.after(fault.duration, [server, is_refusal] {
+      if (is_refusal)
+        server->refuse_writes(false);
+      else
+        server->go_on_recording();
+    });
   }
 
   void kill(const Fault& fault) {

@@ -132,6 +132,10 @@ void describe_effect(Map& map, Fault& fault, Kind kind) {
       return map.decide("action", fault.action, [&](Action action) {
         if (action == Action::kStep) map.key(kRequired, "steps", fault.value, kSteps);
       });
+    case Kind::kRefuse:
+    case Kind::kBlock:
+      map.key(kRequired, "program", fault.program, kServer);
+      return lasts();
     case Kind::kPartition:
     case Kind::kStall:
       return lasts();

@@ -49,8 +49,10 @@ enum class Kind {
   kPartition,
   kClog,
   kStall,
+  kRefuse,
+  kBlock,
 };
-inline std::array<Name<Kind>, 14> names_of(Kind) {
+inline std::array<Name<Kind>, 16> names_of(Kind) {
   return {{{"kill", Kind::kKill},
            {"power-cut", Kind::kPowerCut},
            {"stop", Kind::kStop},
@@ -64,7 +66,9 @@ inline std::array<Name<Kind>, 14> names_of(Kind) {
            {"request", Kind::kRequest},
            {"partition", Kind::kPartition},
            {"clog", Kind::kClog},
-           {"stall", Kind::kStall}}};
+           {"stall", Kind::kStall},
+           {"refuse", Kind::kRefuse},
+           {"block", Kind::kBlock}}};
 }
 /// As ControlAction in idl/sls.idl.
 enum class Action { kStart, kPause, kStep, kResume, kReset, kStop };

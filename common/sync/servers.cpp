@@ -50,7 +50,7 @@ std::optional<Run> Servers::find_best(const std::vector<PresentRun>& runs,
 }
 
 void Servers::note(const Parameters& sample, const bus::PeerId& sender, Time now) {
-  Server* server = find_or_add_server(sender, now);
+  Server* server = find_or_add_server(sender, true, now);
   if (!server) return;
   Claim& claim = find_or_add(server->claims, sample.run_id());
   if (claim.number == 0) claim.number = ++claims_;
@@ -59,7 +59,7 @@ void Servers::note(const Parameters& sample, const bus::PeerId& sender, Time now
 }
 
 bool Servers::note(const SimStatus& sample, const bus::PeerId& sender, Time now) {
-  Server* server = find_or_add_server(sender, now);
+  Server* server = find_or_add_server(sender, false, now);
   if (!server) return false;
   HeardStatus& heard = find_or_add(server->statuses, sample.run_id());
   heard.status = sample;
@@ -107,9 +107,10 @@ Servers::Unclaimed Servers::look_for_unclaimed(
   return unclaimed;
 }
 
-Servers::Server* Servers::find_or_add_server(const bus::PeerId& sender, Time now) {
-  const auto is_kept = [this](const bus::PeerId& peer) {
-    return peer == self_ || present_.count(peer) > 0;
+Servers::Server* Servers::find_or_add_server(const bus::PeerId& sender, bool claims, Time now) {
+  // One that claims nothing displaces none that did: that may be a server that has just left.
+  const auto is_kept = [&](const bus::PeerId& peer) {
+    return peer == self_ || present_.count(peer) > 0 || (!claims && servers_.at(peer).parameters);
   };
   if (!make_room(servers_, kMostServers, sender, is_kept)) return nullptr;
   const auto [server, is_new] = servers_.try_emplace(sender);

@@ -128,7 +128,7 @@ class Servers {
   static std::optional<Run> find_best(const std::vector<PresentRun>& runs,
                                       std::uint32_t vehicle_id);
   void report_impostors(std::uint64_t run_id);
-  Server* find_or_add_server(const bus::PeerId& sender, Time now);
+  Server* find_or_add_server(const bus::PeerId& sender, bool claims, Time now);
   std::optional<bus::PeerId> find_owner(std::uint64_t run_id) const;
   const HeardStatus* find_heard(std::uint64_t run_id) const;
   bool is_present_run(const bus::PeerId& server, const Server& known, Time now) const;

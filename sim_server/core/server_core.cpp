@@ -149,8 +149,9 @@ void ServerCore::on_look(Surroundings& around, sync::Time now) {
 }
 
 void ServerCore::on_failure(const std::string& reason, sync::Time now) {
-  if (phase_ == Phase::kEnded && end_ == End::kFailed) return;  // only the first failure counts
+  if (!error_.empty()) return;  // only the first failure counts
   error_ = reason;
+  if (phase_ == Phase::kEnded && end_ == End::kFinished) return;
   end_run(End::kFailed, RunPhase::PHASE_FAILED, reason, now);
 }
 
@@ -190,7 +191,8 @@ void ServerCore::begin_flight(sync::Time now) {
 
 Leaving ServerCore::leave(sync::Time now) const {
   const bool may_lack = parts_.scenario.sync.wait.recorder.policy == config::RecorderPolicy::kGoOn;
-  return Leaving(error_.empty() ? recorders_.expected() : 0, !may_lack, now);
+  const bool has_failed = !error_.empty() && end_ != End::kFinished;
+  return Leaving(has_failed ? 0 : recorders_.expected(), !may_lack, now);
 }
 
 bool ServerCore::is_between_steps() const {

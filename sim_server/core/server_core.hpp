@@ -76,8 +76,8 @@ class ServerCore {
   void on_look(Surroundings& around, sync::Time now);
   /// The time is `now`.
   void on_time(sync::Time now);
-  /// The shell could not do what the core wanted. Also after the end: a finished run may not be
-  /// published, or the run after a reset not be made.
+  /// The shell could not do what the core wanted. Also after the end: after a reset the next run
+  /// may not be made, and a finished one, which stays finished, not be published.
   void on_failure(const std::string& reason, sync::Time now);
 
   /// The main thread has woken: looks, calls `deliver()` for what waits, and goes on, in the
@@ -103,7 +103,7 @@ class ServerCore {
   enum class End { kFinished, kReset, kFailed };
   /// In phase kEnded: how.
   End end() const { return end_; }
-  /// Why the run failed.
+  /// Why the run failed; or, although it was finished, what the server could not tell the others.
   const std::string& error() const { return error_; }
 
   std::uint64_t run_id() const { return parts_.run_id; }

@@ -49,8 +49,8 @@ TEST_F(WorldsTest, EveryPropertyHoldsInEveryWorld) {
   // The worlds try something: most flights get through, and every kind of fault happens.
   EXPECT_GT(result.finished, kWorlds * 7 / 10);
   EXPECT_GT(result.complete, kWorlds * 7 / 10);
-  EXPECT_EQ(result.faults.size(), 14u);
-  for (const auto& [kind, count] : result.faults) EXPECT_GT(count, kWorlds / 12) << kind;
+  EXPECT_EQ(result.faults.size(), names_of(config::faults::Kind()).size());
+  for (const auto& [kind, count] : result.faults) EXPECT_GT(count, kWorlds / 50) << kind;
 }
 
 TEST_F(WorldsTest, SeedsThatFailedOnceHold) {

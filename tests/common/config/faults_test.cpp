@@ -79,8 +79,8 @@ TEST(FaultsTest, EachMistakeGivesItsLine) {
   EXPECT_EQ(
       find_error_of("{ kind: explode, at_s: 1 }"),
       "file:2: faults[0].kind: expected kill or power-cut or stop or interrupt or cut or "
-      "isolate or loss or slow or clock or disk-full or request or partition or clog or stall, got "
-      "explode");
+      "isolate or loss or slow or clock or disk-full or request or partition or clog or stall or "
+      "refuse or block, got explode");
   EXPECT_EQ(find_error_of("{ kind: kill, program: vehicle, at_s: 1 }"),
             "file:2: faults[0].program: expected server, controller or recorder, with a number "
             "where there are several (controller-2), got vehicle");

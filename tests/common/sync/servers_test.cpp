@@ -218,6 +218,10 @@ TEST_F(ServersTest, OthersCannotFillTheMemory) {
   servers_.note(claim(kRun, {kVehicle}), kServer, at(0));
   EXPECT_EQ(servers_.runs(at(0)).size(), 1u) << "one that has left makes room";
   EXPECT_TRUE(servers_.has_claimed(kSelf)) << "our own run stays";
+  servers_.note(status(kRun, kRunning), kServer, at(0));
+  servers_.set_present({});
+  for (std::uint8_t i = 180; i < 250; ++i) servers_.note(status(i, kRunning), peer(i), at(0));
+  EXPECT_TRUE(servers_.find_status(kRun)) << "the last word of a server that left a moment ago";
 }
 
 TEST(ProgressTest, ARunningServerIsFurtherThanAWaitingOneAndAnEndedOneIsNoServer) {

@@ -143,6 +143,10 @@ TEST(ServerLockstepTest, TheAnswerThatEndsTheMissionEndsTheRun) {
   EXPECT_NE(rig.take_log().back().find("finished: 250 steps, 1 s simulated in 0.00 s"),
             std::string::npos)
       << "a pause is no flying time";
+  rig.fail("sls/status: write refused");
+  EXPECT_EQ(rig.core().end(), End::kFinished) << "a finished run stays so";
+  EXPECT_EQ(rig.status().phase(), RunPhase::PHASE_FINISHED);
+  EXPECT_EQ(rig.core().error(), "sls/status: write refused");
 }
 
 TEST(ServerLockstepTest, ARefusedAnswerOfTheOnlyClientFailsTheRun) {
