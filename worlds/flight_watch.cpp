@@ -310,6 +310,7 @@ void FlightWatch::check_policy(const model::StepRecord& record) {
   const bool is_held = record.kind == model::AnswerKind::kHeld;
   if (!is_held && record.kind != model::AnswerKind::kFailSafe) {
     lacking_.erase(record.vehicle_id);
+    note_newest(record.vehicle_id, record.step);
     return;
   }
   if (is_lockstep() &&

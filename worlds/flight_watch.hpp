@@ -53,8 +53,10 @@ class FlightWatch {
   void on_published(std::uint64_t step, Instant now);
   void on_resent(Instant now);
   void on_recorded(const std::vector<model::StepRecord>& records, Instant now);
-  /// An answer of `vehicle` to an earlier step counts from now on.
-  void on_late(std::uint32_t vehicle) { lacking_.erase(vehicle); }
+  /// An answer of `vehicle` to an earlier step counts from now on, unless a newer one does.
+  void on_late(std::uint32_t vehicle, std::uint64_t step) {
+    if (note_newest(vehicle, step)) lacking_.erase(vehicle);
+  }
   /// A status of a flight that runs, not paused.
   void on_running(Instant now);
   /// The run fails with `reason`. False if it is none of those that participants cause.
@@ -113,6 +115,13 @@ class FlightWatch {
     std::uint64_t held = 0;
   };
 
+  /// True if no answer of `vehicle` to this or a later step is known.
+  bool note_newest(std::uint32_t vehicle, std::uint64_t step) {
+    const auto [newest, is_first] = newest_.try_emplace(vehicle, step);
+    const bool is_newer = is_first || step > newest->second;
+    if (is_newer) newest->second = step;
+    return is_newer;
+  }
   bool is_unclear() const;
   bool is_disturbed() const;
   bool is_lockstep() const { return sync_.mode == config::SyncMode::kLockstep; }
@@ -148,6 +157,7 @@ class FlightWatch {
   std::set<std::string> rightful_;               // ready for this run, at any time
   std::map<std::uint32_t, std::string> flyers_;  // of the last step, by vehicle
   std::map<std::uint32_t, Lacking> lacking_;
+  std::map<std::uint32_t, std::uint64_t> newest_;  // steps with answers, by vehicle
   bool has_begun_ = false;
   std::uint64_t step_ = 0;
   Instant published_{0};

@@ -32,7 +32,11 @@ class Host {
   Wall wall() const {
     return Wall(std::chrono::duration_cast<Wall::duration>(kEpoch + calc_elapsed() + wall_offset_));
   }
-  void set_wall_clock(std::chrono::nanoseconds jump) { wall_offset_ += jump; }
+  void set_wall_clock(std::chrono::nanoseconds jump) {
+    wall_offset_ += jump;
+    has_jumped_ = true;
+  }
+  bool has_jumped() const { return has_jumped_; }
   /// The moment of the world at which this host's monotonic clock shows `time`; never too early.
   Instant find(sync::Time time) const {
     const double elapsed = static_cast<double>((time.time_since_epoch() - uptime_).count());
@@ -53,6 +57,7 @@ class Host {
   const std::chrono::nanoseconds uptime_;
   const double drift_;
   std::chrono::nanoseconds wall_offset_;
+  bool has_jumped_ = false;  // the wall clock
 };
 
 /// A process on a host: what it does happens only while it runs.

@@ -246,11 +246,12 @@ void Properties::check_problem(const SimStatus& status) {
       return time != times.end() && time->second - since < kRepeatsWithin;
     };
     if (is_soon(killed_) || is_soon(stopped_)) continue;
-    // Clocks of two hosts differ. The first client decides on libraries. A client may wait for, or
-    // fly for, another server.
-    const std::string& host = runs_.at(status.run_id()).server->process().host().name();
+    // Clocks of two hosts differ, or jump while a sample waits. The first client decides on
+    // libraries. A client may wait for, or fly for, another server.
+    const Host& host = runs_.at(status.run_id()).server->process().host();
     const bool is_true =
-        (holds("source timestamp") && !holds((" on " + host + ":").c_str())) ||
+        (holds("source timestamp") &&
+         (host.has_jumped() || !holds((" on " + host.name() + ":").c_str()))) ||
         (holds("library_sha256") && has_libraries_) ||
         (holds("run_id: ") && is_of_other_run(problem.substr(problem.rfind("got ") + 4), status));
     if (!is_true) find(fmt::format("accuses: {}", problem));

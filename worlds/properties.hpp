@@ -81,7 +81,7 @@ class Properties {
   void on_late(std::uint64_t run_id, std::uint32_t vehicle, std::uint64_t step) {
     runs_[run_id].has_late = true;
     runs_[run_id].late[vehicle].insert(step);
-    runs_[run_id].flight->on_late(vehicle);
+    runs_[run_id].flight->on_late(vehicle, step);
   }
   void on_status(const SimStatus& status, const Network& network);
   /// `reason`: why it failed.
