@@ -638,11 +638,12 @@ void Properties::check_end(const Program& server,
     for (const auto& program : programs) {
       const bool took_part =
           run.recorders.count(program->name()) > 0 || run.done.count(program->name()) > 0;
-      if (program->role() != Role::kRecorder || !took_part) continue;
-      if (program->was_killed()) {
+      if (program->role() != Role::kRecorder) continue;
+      if (program->was_killed()) {  // it may have been known before it was ready
         last = std::max(last, killed_.at(program->name()) + sync::kPresumedDeadAfter);
         continue;
       }
+      if (!took_part) continue;
       last = std::max(last, program->ended());
       const auto ready = run.ready_since.find(program->name());
       const bool is_known =
