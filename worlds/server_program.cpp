@@ -146,8 +146,9 @@ void ServerProgram::write_waiting() {
   while (!outbox_.empty()) {
     const Item item = std::move(outbox_.front());
     outbox_.pop_front();
-    const bool is_reliable = !std::holds_alternative<sync::Line>(item);
-    if (is_refused_ && is_reliable && !std::holds_alternative<EndRecords>(item)) {
+    const bool is_sample =
+        std::holds_alternative<SimStatus>(item) || std::holds_alternative<SimControlReply>(item);
+    if (is_refused_ && is_sample) {
       fail_refused();
     } else if (const auto* status = std::get_if<SimStatus>(&item)) {
       setting_.properties.on_status(*status, setting_.network);
@@ -173,9 +174,9 @@ void ServerProgram::fail_refused() {
   core_->on_failure("write refused", now());
 }
 
-void ServerProgram::go_on_recording() {
-  if (!std::exchange(is_blocked_, false) || process_.has_ended()) return;
-  process_.run([this] { write_records(false); });
+void ServerProgram::block_records(bool is_blocked) {
+  const bool goes_on = std::exchange(is_blocked_, is_blocked) && !is_blocked;
+  if (goes_on && !process_.has_ended()) process_.run([this] { write_records(false); });
 }
 
 // --- the middleware's thread ---------------------------------------------------------------------

@@ -29,8 +29,7 @@ class ServerProgram : public Program, private sim::Outputs, private sim::Surroun
   void refuse_writes(bool is_refused) { is_refused_ = is_refused; }
   bool has_been_refused() const { return has_been_refused_; }
   /// The thread that writes sls/record waits for the middleware.
-  void block_records() { is_blocked_ = true; }
-  void go_on_recording();
+  void block_records(bool is_blocked);
 
  private:
   /// Flights of worlds are short.

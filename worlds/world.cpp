@@ -207,17 +207,10 @@ class World {
   void hinder_writes(const Fault& fault) {
     auto* server = static_cast<ServerProgram*>(current_[fault.target]);
     if (!server) return;
-    const bool is_refusal = fault.kind == Kind::kRefuse;
-    if (is_refusal)
-      server->refuse_writes(true);
-    else
-      server->block_records();
-    setting_.timeline.after(fault.duration, [server, is_refusal] {
-      if (is_refusal)
-        server->refuse_writes(false);
-      else
-        server->go_on_recording();
-    });
+    const auto hinder =
+        fault.kind == Kind::kRefuse ? &ServerProgram::refuse_writes : &ServerProgram::block_records;
+    (server->*hinder)(true);
+    setting_.timeline.after(fault.duration, [server, hinder] { (server->*hinder)(false); });
   }
 
   void kill(const Fault& fault) {
