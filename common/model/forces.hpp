@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 
+#include "common/model/dot.hpp"
 #include "common/model/math.hpp"
 #include "common/model/parameters.hpp"
 
@@ -16,7 +17,7 @@ inline Eigen::Vector3d calc_rotor_drag(const Eigen::Vector3d& f_Q_W, const Eigen
   if (air.rotor_drag == 0.0 || f_Q_W.isZero(0.0)) return Eigen::Vector3d::Zero();
   const Eigen::Vector3d direction = f_Q_W.stableNormalized();
   const Eigen::Vector3d v_rel = v_WQ - air.v_wind_W;
-  return -air.rotor_drag * (v_rel - direction * direction.dot(v_rel));
+  return -air.rotor_drag * (v_rel - direction * dot(direction, v_rel));
 }
 
 /// Attitude a multirotor must take so that its thrust along −z of the body is `f_Q_W`.

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <cmath>
 
+#include "common/model/dot.hpp"
 #include "common/model/parameters.hpp"
 #include "common/model/state.hpp"
 
@@ -29,7 +30,7 @@ inline double calc_rod_length_error(const SlungLoadState& state, double rod_leng
 
 /// |(v_WL − v_WQ) · n_W|, m/s: the speed at which the rod would be stretched.
 inline double calc_rod_stretch_rate(const SlungLoadState& state) {
-  return std::abs((state.v_WL - state.v_WQ).dot((state.p_WL - state.p_WQ).normalized()));
+  return std::abs(dot(state.v_WL - state.v_WQ, (state.p_WL - state.p_WQ).normalized()));
 }
 
 }  // namespace sls::model

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/model/dot.hpp"
 #include "common/model/math.hpp"
 
 namespace sls::model {
@@ -58,7 +59,7 @@ void StepResponses::add(double time_s, const Eigen::Vector3d& error) {
   for (int axis = 0; axis < 3; ++axis)
     responses_[static_cast<std::size_t>(axis)].add(time_s, std::abs(error[axis]),
                                                    error[axis] * signs_[axis]);
-  responses_[kNorm].add(time_s, error.norm(), error.dot(direction_));
+  responses_[kNorm].add(time_s, error.norm(), dot(error, direction_));
 }
 
 Eigen::Vector3d calc_steady_state_error(

@@ -6,6 +6,7 @@
 
 #include "common/config/config_error.hpp"
 #include "common/config/scenario.hpp"
+#include "common/model/dot.hpp"
 #include "common/model/math.hpp"
 
 namespace sls::scene {
@@ -24,8 +25,8 @@ Points sort_around(Points points) {
   // The normal of the plane comes first. Not computeDirect, which calls the C library's atan2.
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> axes(offsets * offsets.transpose());
   const auto calc_angle = [&](const Eigen::Vector3d& point) {
-    return math::atan2(axes.eigenvectors().col(1).dot(point - mean),
-                       axes.eigenvectors().col(2).dot(point - mean));
+    return math::atan2(model::dot(axes.eigenvectors().col(1), point - mean),
+                       model::dot(axes.eigenvectors().col(2), point - mean));
   };
   std::stable_sort(points.begin(), points.end(),
                    [&](const auto& a, const auto& b) { return calc_angle(a) < calc_angle(b); });

@@ -3,6 +3,7 @@
 usage: same_bits_test.py CHECK BUILD
   symbols       programs and Python module need no function of libm but exact ones
   instructions  neither they nor Simbody hold fused instructions
+  calls         the sources call nothing whose bits depend on the version of Eigen
   flights       every shipped scenario: no call of an inexact function of libm, the same certificate with the
                 processor's features masked: with all masks for one scenario of each plant and autopilot, else with the
                 one that masks most
@@ -25,6 +26,8 @@ SHIM = BUILD / "tests/libraries/math_shim.so"
 # IEEE 754 asks for the nearest result of the square root; the others only select, round or scale: they have one result.
 EXACT = {"sqrt", "fabs", "floor", "ceil", "trunc", "round", "lround", "llround", "rint", "lrint", "llrint", "nearbyint",
          "fmod", "remainder", "ldexp", "frexp", "scalbn", "modf", "nextafter", "fmax", "fmin", "copysign"}
+# Since Eigen 5 these add from left to right, before in halves: common/model/dot.hpp. The others call dot().
+BY_VERSION = re.compile(r"(?:\.|->)(?:dot|slerp|angularDistance|setFromTwoVectors)\(|\bFromTwoVectors\(")
 # Masks of features by which glibc and others choose their code.
 MASKS = ("", "-AVX2,-FMA,-FMA4",
          "-AVX,-AVX2,-FMA,-FMA4,-AVX512F,-AVX512VL,-AVX512DQ,-AVX512BW,-AVX512CD,-SSE4_1,-SSE4_2")
@@ -72,6 +75,15 @@ def check_instructions() -> list[str]:
         if found != "0":
             errors.append(f"{file.name}: expected no fused instruction, got {found}")
     return errors
+
+
+def check_calls() -> list[str]:
+    sources = [file for folder in ("common", "sim_server", "control_client", "closed_loop", "recorder", "python/bindings")
+               for file in (ROOT / folder).rglob("*.[ch]pp")]
+    assert len(sources) > 100 and BY_VERSION.search("a.dot(b)"), "expected sources"
+    return [f"{file.relative_to(ROOT)}:{number}: expected model::dot() or a formula, got {call[0]}"
+            for file in sources for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1)
+            for call in BY_VERSION.finditer(line.partition("//")[0])]
 
 
 def fly(scenario: Path, mask: str, folder: Path) -> tuple[str, list[str]]:
@@ -128,6 +140,7 @@ def check_flights() -> list[str]:
         return [error for errors in pool.map(check_flight, masks, masks.values()) for error in errors]
 
 
-failures = {"symbols": check_symbols, "instructions": check_instructions, "flights": check_flights}[CHECK]()
+failures = {"symbols": check_symbols, "instructions": check_instructions, "calls": check_calls,
+            "flights": check_flights}[CHECK]()
 if failures:
     sys.exit("\n".join(failures))

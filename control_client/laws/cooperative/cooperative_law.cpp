@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "common/model/dot.hpp"
 #include "common/model/math.hpp"
 #include "common/model/rotation.hpp"
 
@@ -43,10 +44,10 @@ Jet to_world(const Jet& of_B, const Matrix3d& R_WB, const Jet& w_B) {
 /// Eq. (10): the unit vector against `of`.
 Jet calc_opposite_direction(const Jet& of) {
   const double r = 1.0 / std::sqrt(of.value.squaredNorm());
-  const double slope = of.value.dot(of.first);
+  const double slope = model::dot(of.value, of.first);
   const double r_dot = -r * r * r * slope;
-  const double r_ddot =
-      -r * r * r * (of.first.squaredNorm() + of.value.dot(of.second)) - 3.0 * r * r * r_dot * slope;
+  const double r_ddot = -r * r * r * (of.first.squaredNorm() + model::dot(of.value, of.second)) -
+                        3.0 * r * r * r_dot * slope;
   return {-r * of.value, -(r * of.first + r_dot * of.value),
           -(r * of.second + 2.0 * r_dot * of.first + r_ddot * of.value)};
 }
@@ -171,7 +172,7 @@ LawOutput CooperativeLaw::calc(const LawInput& input) const {
   const Vector3d error = d.value.cross(n);
   const Vector3d rate_error = n.cross(n_dot) + n.cross(n.cross(w_d));
   const Vector3d w_dot = -gains_.cable_angle * error - gains_.cable_rate * rate_error -
-                         n.dot(w_d) * n_dot - n.cross(n.cross(w_d_dot));
+                         model::dot(n, w_d) * n_dot - n.cross(n.cross(w_d_dot));
   const Vector3d n_ddot = w_dot.cross(n) - n_dot.squaredNorm() * n;
 
   // Eq. (12): Newton's law of the vehicle, where the load moves as designed.
@@ -181,7 +182,7 @@ LawOutput CooperativeLaw::calc(const LawInput& input) const {
   const double length = state.signals[SharedLoad::kLength];
   output.f_Q_W =
       believed_.quad_mass * (a_WE - length * n_ddot - Vector3d(0.0, 0.0, believed_.gravity)) +
-      n.dot(plan.pull_W.value) * n;
+      model::dot(n, plan.pull_W.value) * n;
   if (!output.f_Q_W.allFinite()) return fail(ErrorCode::kNotFinite);
   return output;
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/model/dot.hpp"
 #include "common/model/math.hpp"
 #include "control_client/laws/error_integral.hpp"
 #include "control_client/laws/qsf/lqr.hpp"
@@ -53,10 +54,10 @@ Vector3d calc_rod_acceleration(const Vector2d& w, const Vector2d& w_dot, const V
   const Vector3d W(w.x(), w.y(), 1.0), W_dot(w_dot.x(), w_dot.y(), 0.0),
       W_ddot(w_ddot.x(), w_ddot.y(), 0.0);
   const double r = 1.0 / W.norm();
-  const double W_W_dot = W.dot(W_dot);
+  const double W_W_dot = model::dot(W, W_dot);
   const double r_dot = -r * r * r * W_W_dot;
   const double r_ddot =
-      -r * r * r * (W_dot.squaredNorm() + W.dot(W_ddot)) - 3.0 * r * r * r_dot * W_W_dot;
+      -r * r * r * (W_dot.squaredNorm() + model::dot(W, W_ddot)) - 3.0 * r * r * r_dot * W_W_dot;
   return r * W_ddot + 2.0 * r_dot * W_dot + r_ddot * W;
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/model/dot.hpp"
 #include "common/model/shared_load.hpp"
 
 namespace sls::control {
@@ -23,14 +24,14 @@ bool SlackRule::applies(const model::Measurement& state) const {
 }
 
 Vector3d SlackRule::limit_rate(const Vector3d& a_W, const Chord& chord) const {
-  const double rate = chord.n_W.dot(chord.r_dot_W);
+  const double rate = model::dot(chord.n_W, chord.r_dot_W);
   const double across = (chord.r_dot_W - rate * chord.n_W).squaredNorm();
   // A load that passes close by has its whole cable to run: the denominator bounds the term.
   const double turning = across / std::max(chord.distance, 0.1 * vehicle_.rod_length);
   const double per_second = std::min(2.0 * vehicle_.gravity / retaut_rate_, 1.0 / period_);
   const double least =
       vehicle_.gravity * chord.n_W.z() + turning - per_second * (retaut_rate_ - rate);
-  return a_W + std::max(0.0, least - chord.n_W.dot(a_W)) * chord.n_W;  // eq. (14)
+  return a_W + std::max(0.0, least - model::dot(chord.n_W, a_W)) * chord.n_W;  // eq. (14)
 }
 
 Vector3d SlackRule::calc_force(const model::Measurement& state,

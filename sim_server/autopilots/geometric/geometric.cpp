@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/model/dot.hpp"
 #include "sim_server/autopilots/autopilot.hpp"
 #include "sim_server/autopilots/geometric/allocation.hpp"
 #include "sim_server/autopilots/geometric/attitude_tracking.hpp"
@@ -30,7 +31,7 @@ class Geometric : public Autopilot {
     wanted.R_WB = output_.q_WB.toRotationMatrix();
     const Eigen::Vector3d moment = calc_moment(rotation, wanted, airframe_.inertia_C_B, gains_);
     // Eq. (7). Rotors do not push down.
-    output_.thrust = std::max(0.0, -input.f_Q_W.dot(rotation.R_WB.col(2)));
+    output_.thrust = std::max(0.0, -model::dot(input.f_Q_W, rotation.R_WB.col(2)));
     output_.rotor_speeds = allocation_.calc_thrusts(moment, output_.thrust);
     for (std::size_t i = 0; i < airframe_.rotors.size(); ++i) {
       double& number = output_.rotor_speeds[static_cast<Eigen::Index>(i)];

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 
+#include "common/model/dot.hpp"
 #include "common/model/forces.hpp"
 
 namespace sls::sim {
@@ -51,7 +52,7 @@ AnalyticPlant::Motion AnalyticPlant::calc_next(const Motion& start,
   Motion next = add(add(add(add(start, h / 6, k1), h / 3, k2), h / 3, k3), h / 6, k4);
   // The step's errors in |n| = 1 and n·ω = 0, of order h⁵, are removed.
   next.n_W.normalize();
-  next.w_W -= next.n_W * next.n_W.dot(next.w_W);
+  next.w_W -= next.n_W * model::dot(next.n_W, next.w_W);
   return next;
 }
 

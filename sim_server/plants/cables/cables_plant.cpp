@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/config/numbers.hpp"
+#include "common/model/dot.hpp"
 
 namespace sls::sim {
 namespace {
@@ -160,7 +161,7 @@ model::Measurement CablesPlant::measure(std::size_t vehicle) const {
   const double distance = std::sqrt(d_W.squaredNorm());
   if (distance > 0.0 && !motion_.is_cut(vehicle)) {  // else the cable has no end there, and hangs
     const Eigen::Vector3d n_W = d_W / distance;
-    state.rod = model::to_angles({n_W, (drift_W - n_W * n_W.dot(drift_W)) / distance});
+    state.rod = model::to_angles({n_W, (drift_W - n_W * model::dot(n_W, drift_W)) / distance});
     if (n_W.y() == 0.0 && n_W.z() == 0.0) state.rod.alpha = state.rod.alpha_dot = 0.0;  // undefined
   }
   model::Measurement measured(state);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/model/dot.hpp"
 #include "common/model/forces.hpp"
 
 namespace sls::sim::cables {
@@ -17,7 +18,7 @@ using Eigen::Vector3d;
 Eigen::Vector4d calc_quaternion_rate(const Eigen::Vector4d& q, const Vector3d& w) {
   const Vector3d vector = q.tail<3>();
   Eigen::Vector4d rate;
-  rate[0] = -0.5 * vector.dot(w);
+  rate[0] = -0.5 * model::dot(vector, w);
   rate.tail<3>() = 0.5 * (q[0] * w + vector.cross(w));
   return rate;
 }
@@ -87,7 +88,7 @@ void calc_geometry(const System& system, const Motion& motion, const Members& ca
     const double distance = std::sqrt(to_attachment.squaredNorm());
     const double inverse = distance > 0.0 ? 1.0 / distance : 0.0;
     const Vector3d n_W = inverse * to_attachment;
-    const double away = n_W.dot(drift);
+    const double away = model::dot(n_W, drift);
     geometry.n_W[i] = n_W;
     geometry.stretch[i] = distance - vehicle.length;
     geometry.stretch_rate[i] = away - vehicle.length_rate;
@@ -106,8 +107,8 @@ void calc_matrix(const System& system, const Geometry& geometry, const Members& 
     const std::size_t i = cables[row];
     for (std::size_t column = 0; column <= row; ++column) {
       const std::size_t j = cables[column];
-      double element = inverse_mass * geometry.n_W[i].dot(geometry.n_W[j]);
-      if (system.is_rigid) element += geometry.moment_L[i].dot(geometry.turn_L[j]);
+      double element = inverse_mass * model::dot(geometry.n_W[i], geometry.n_W[j]);
+      if (system.is_rigid) element += model::dot(geometry.moment_L[i], geometry.turn_L[j]);
       if (i == j) element += 1.0 / system.vehicle_mass[i];
       matrix[i][j] = matrix[j][i] = element;
     }
@@ -159,13 +160,13 @@ void calc_offset(const System& system, const Motion& motion, const Geometry& geo
                  const Actions& actions, const Motion& free_rate, const Members& cables,
                  Vector& offset) {
   for (const std::size_t i : cables) {
-    double apart = geometry.n_W[i].dot(free_rate.v_WL - free_rate.vehicles[i].v_W) +
+    double apart = model::dot(geometry.n_W[i], free_rate.v_WL - free_rate.vehicles[i].v_W) +
                    geometry.bend[i] - actions.length_acceleration[i];
     if (system.is_rigid) {
       const Vector3d& w = motion.w_WL_L;
       const Vector3d inward_L = w.cross(w.cross(system.attachment_L[i]));
-      apart += geometry.moment_L[i].dot(free_rate.w_WL_L) +
-               geometry.n_W[i].dot(geometry.R_WL * inward_L);
+      apart += model::dot(geometry.moment_L[i], free_rate.w_WL_L) +
+               model::dot(geometry.n_W[i], geometry.R_WL * inward_L);
     }
     offset[i] = -apart;
   }

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/model/dot.hpp"
 #include "common/model/math.hpp"
 #include "sim_server/plants/multirotor/airframe.hpp"
 #include "sim_server/plants/multirotor/rotor_speed.hpp"
@@ -91,7 +92,7 @@ struct RotorLoads {
 /// Adds the loads of one rotor. `v_WR_B` is the velocity of its hub through the air, in B, m/s.
 inline void add_loads(const FlyingRotor& rotor, const RotorSpeed& turning,
                       const Eigen::Vector3d& v_WR_B, RotorLoads& loads) {
-  const double axial_speed = v_WR_B.dot(rotor.axis_B);
+  const double axial_speed = model::dot(v_WR_B, rotor.axis_B);
   const double thrust = calc_thrust(rotor, turning, axial_speed);
   const Eigen::Vector3d v_across_B = v_WR_B - axial_speed * rotor.axis_B;
   const Eigen::Vector3d force_B =
