@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Sets up and builds. The commands are in python/sls/launcher; `./sls help` lists them.
 set -euo pipefail
+shopt -s extglob
 
 root="$(cd "$(dirname "$(readlink -f "${BASH_SOURCE[0]}")")" && pwd)"
 readonly root
@@ -19,34 +20,78 @@ readonly test_packages=(libgmock-dev libmpfr-dev python3-clang python3-mpmath ip
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)
 readonly bench_packages=(libbenchmark-dev python3-matplotlib valgrind)
 readonly package_packages=(dpkg-dev file python3-yaml)
-# Packages that only one system has. The launcher installs packages on these systems alone.
-readonly systems=(debian12 debian13)
-readonly debian12_packages=(libfastrtps-dev)
-readonly debian13_packages=(libfastdds-dev)
+# The package of Fast DDS on each system, by the code name of the Debian or Ubuntu that it is or is made from.
+declare -rA fastdds_packages=([bookworm]=libfastrtps-dev [noble]=libfastrtps-dev [trixie]=libfastdds-dev
+  [forky]=libfastdds-dev [resolute]=libfastdds-dev)
+readonly too_old=" buster bullseye focal jammy "
+readonly tried="Debian 12, 13 and testing, Ubuntu 24.04 and 26.04"
 
 say() { echo "sls: $*" >&2; }
 fail() { say "error: $1"; exit "${2:-1}"; }
 
+# --- the environment --------------------------------------------------------------------------------
+
+# Variables that exchange the compiler, its flags or what CMake finds, as conda and a sourced ROS set them.
+readonly of_builds=(CC CXX CFLAGS CXXFLAGS CPPFLAGS LDFLAGS CPATH C_INCLUDE_PATH CPLUS_INCLUDE_PATH LIBRARY_PATH
+  LD_RUN_PATH GCC_EXEC_PREFIX COMPILER_PATH CMAKE_GENERATOR CMAKE_TOOLCHAIN_FILE CMAKE_PREFIX_PATH CMAKE_PROGRAM_PATH
+  CMAKE_INCLUDE_PATH CMAKE_LIBRARY_PATH)
+
+# clean_build: a build gets none of these; says so once.
+clean_build() {
+  local name dropped=()
+  for name in "${of_builds[@]}"; do
+    [[ -z ${!name:-} ]] || dropped+=("$name")
+    unset "$name"
+  done
+  ((${#dropped[@]} == 0)) || say "the build leaves out of your environment: ${dropped[*]}"
+}
+
+# clean_libraries: drops folders of LD_LIBRARY_PATH with another Fast DDS, Fast CDR or Simbody, which would take the place of
+# those that the programs were linked with; says so once.
+clean_libraries() {
+  local folder kept=() dropped=() folders
+  IFS=: read -ra folders <<<"$LD_LIBRARY_PATH"
+  for folder in "${folders[@]}"; do
+    if compgen -G "$folder/lib@(fastcdr|fastdds|fastrtps|SimTKcommon).so*" >/dev/null; then
+      dropped+=("$folder")
+    else
+      kept+=("$folder")
+    fi
+  done
+  ((${#dropped[@]})) || return 0
+  LD_LIBRARY_PATH="$(IFS=:; echo "${kept[*]}")"
+  [[ -n $LD_LIBRARY_PATH ]] || unset LD_LIBRARY_PATH
+  say "leaves out of LD_LIBRARY_PATH, because of another Fast DDS or Simbody there: ${dropped[*]}"
+}
+
 # --- set-up and build -----------------------------------------------------------------------------
 
-# Puts the name of this system into `system`: one of `systems`. Fails on another.
+# Puts the package of Fast DDS for this system into `fastdds`; a newer one than is known gets what it has. Puts "yes" into
+# `is_ubuntu` if it is one. Fails on an older one, and on one without Debian's packages.
 expect_system() {
-  local name
-  IFS=/ read -r system name < <(
-    unset ID VERSION_ID PRETTY_NAME
+  local name codename like advice="fly in containers with ./sls docker-demo"
+  IFS=/ read -r codename like name < <(
+    unset ID ID_LIKE PRETTY_NAME VERSION_CODENAME UBUNTU_CODENAME DEBIAN_CODENAME
     [[ ! -r /etc/os-release ]] || . /etc/os-release
-    echo "${ID:-}${VERSION_ID:-}/${PRETTY_NAME:-unknown (no /etc/os-release)}"
+    echo "${UBUNTU_CODENAME:-${DEBIAN_CODENAME:-${VERSION_CODENAME:-}}}/${ID:-} ${ID_LIKE:-}/${PRETTY_NAME:-unknown (no /etc/os-release)}"
   )
-  [[ " ${systems[*]} " == *" $system "* ]] ||
-    fail "this system is $name; tried are Debian 12 and 13. Elsewhere install by hand what the lists at the top of $root/sls name, then add --no-install"
+  [[ " $like " == *' ubuntu '* ]] && is_ubuntu=yes || is_ubuntu=
+  fastdds="${fastdds_packages[${codename:-none}]:-}"
+  [[ -z $fastdds ]] || return 0
+  [[ $too_old != *" ${codename:-none} "* ]] || fail "this system is $name, whose packages are too old; tried are $tried: $advice"
+  [[ " $like " =~ ' '(debian|ubuntu)' ' ]] ||
+    fail "this system is $name; tried are $tried. Elsewhere $advice, or install by hand what the lists at the top of $root/sls name, then add --no-install"
+  fastdds=libfastdds-dev
+  [[ -n $(apt-cache policy libfastdds-dev 2>/dev/null) || -z $(apt-cache policy libfastrtps-dev 2>/dev/null) ]] ||
+    fastdds=libfastrtps-dev
+  unknown="this system is $name, which is not known here: taking $fastdds and the other packages of $tried"
 }
 
 # setup_flight [PACKAGE…]: installs the packages for building the programs of a flight, and the given ones.
 setup_flight() {
   ((is_installing)) || return 0
   expect_system
-  local -n own="${system}_packages"
-  install_missing "${flight_packages[@]}" "${own[@]}" "$@"
+  install_missing "${flight_packages[@]}" "$fastdds" "$@"
 }
 
 # setup [PACKAGE…]: installs the packages for building everything, and the given ones.
@@ -93,6 +138,10 @@ install_missing() {
   ((${#missing[@]})) || return 0
   ((is_installed == 0)) || fail "this needs packages that are not installed: apt-get install ${missing[*]}"
   expect_system
+  [[ -z ${unknown:-} ]] || say "$unknown"
+  # Ubuntu's chromium is a snap, which a container cannot install: tests of pages use a browser that there is, or skip.
+  [[ -z $is_ubuntu ]] || readarray -t missing < <(printf '%s\n' "${missing[@]}" | grep -vx chromium)
+  ((${#missing[@]})) || return 0
   say "installing with apt-get: ${missing[*]}"
   local sudo=() log
   if ((EUID != 0)); then
@@ -117,10 +166,21 @@ say_size() {
   [[ -z $size ]] || say "apt-get: $size" 2>&3
 }
 
-# has_tree FOLDER: true if it is a build tree of this checkout made with Ninja, false if none, copied or moved.
+# has_tree FOLDER: true if it is a build tree of this checkout made with Ninja, on this version of the system and with the
+# Fast DDS that is asked for; false if none, copied or moved.
 has_tree() {
   [[ -f $1/build.ninja && -f $1/CMakeCache.txt ]] &&
-    [[ $(grep -cxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$root" -e CMAKE_GENERATOR:INTERNAL=Ninja "$1/CMakeCache.txt") == 2 ]]
+    [[ $(grep -cxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$root" -e CMAKE_GENERATOR:INTERNAL=Ninja \
+      -e "SLS_MADE_ON:STRING=$(describe_place)" "$1/CMakeCache.txt") == 3 ]]
+}
+
+# describe_place: the system and the folder of Fast DDS that a build tree is made for.
+describe_place() {
+  (
+    unset ID VERSION_ID VERSION_CODENAME
+    [[ ! -r /etc/os-release ]] || . /etc/os-release
+    echo "${ID:-} ${VERSION_ID:-${VERSION_CODENAME:-}} ${SLS_FASTDDS_PREFIX:-}"
+  )
 }
 
 # is_built FOLDER TARGET…: true if building would do nothing. Ninja compares every file that the build has read, system
@@ -176,14 +236,15 @@ show_progress() {
 # values, and leave out a sanitizer. Then the tree is made anew.
 configure() {
   local said status=0
-  said="$(cmake --preset "$@" 2>&1)" || status=$?
+  said="$(cmake --preset "$@" "-DSLS_MADE_ON=$(describe_place)" 2>&1)" || status=$?
   printf '%s\n' "$said"
-  [[ $said != *'require your cache to be deleted'* ]] || { cmake --preset "$1" --fresh; return; }
+  [[ $said != *'require your cache to be deleted'* ]] || { cmake --preset "$1" --fresh "-DSLS_MADE_ON=$(describe_place)"; return; }
   return "$status"
 }
 
 # build_tree PRESET FOLDER [TARGET…]: configures and builds; all targets by default.
 build_tree() {
+  clean_build
   local preset=$1 folder=$2 targets=() fresh=() lock log="$2/build.log" began configured
   shift 2
   (($#)) && targets=(--target "$@")
@@ -209,6 +270,7 @@ build_tree() {
     fail "the build failed (whole log: $log)"
   fi
   exec {lock}>&-
+  sed -nE 's/^-- (Fast DDS: takes .*SLS_FASTDDS_PREFIX.*)/sls: \1/p' "$log" >&2
   say "$folder: configured in $((configured - began)) s, compiled in $((SECONDS - configured)) s"
 }
 
@@ -237,6 +299,7 @@ expand() {
   done
 }
 
+[[ -z ${LD_LIBRARY_PATH:-} ]] || clean_libraries
 is_installing=1
 [[ ${1:-} != --no-install || $# == 1 ]] || { is_installing=0; shift; }
 [[ ${1:-} == python || " $* " != *' --no-install '* ]] || is_installing=0

@@ -2,20 +2,29 @@
 
 A copy of the launcher reads the test's own os-release. Stand-ins for dpkg-query, apt-get and npm record their calls."""
 
+import re
 import subprocess
 
 from checkout import CheckoutTest
 
-DEBIAN = 'PRETTY_NAME="Debian GNU/Linux {0} ({1})"\nNAME="Debian GNU/Linux"\nVERSION_ID="{0}"\nID=debian\n'
-BOOKWORM, TRIXIE = DEBIAN.format(12, "bookworm"), DEBIAN.format(13, "trixie")
-NOT_TRIED = {
-    "Debian GNU/Linux 11 (bullseye)": DEBIAN.format(11, "bullseye"),
-    "Debian GNU/Linux forky/sid": 'PRETTY_NAME="Debian GNU/Linux forky/sid"\nID=debian\n',
-    "Ubuntu 24.04.1 LTS": 'PRETTY_NAME="Ubuntu 24.04.1 LTS"\nID=ubuntu\nID_LIKE=debian\nVERSION_ID="24.04"\n',
-    "Fedora Linux 41": "ID=fedora\nVERSION_ID=41\nPRETTY_NAME='Fedora Linux 41'\n",
-    "Mint 12": 'ID=linuxmint\nID_LIKE=debian\nVERSION_ID="12"\nPRETTY_NAME="Mint 12"\n',
-    "unknown (no /etc/os-release)": None,
+DEBIAN = 'PRETTY_NAME="Debian GNU/Linux {0} ({1})"\nNAME="Debian GNU/Linux"\nVERSION_ID="{0}"\nVERSION_CODENAME={1}\nID=debian\n'
+UBUNTU = 'PRETTY_NAME="Ubuntu {0} LTS"\nVERSION_ID="{0}"\nVERSION_CODENAME={1}\nID=ubuntu\nID_LIKE=debian\nUBUNTU_CODENAME={1}\n'
+MINT = 'PRETTY_NAME="Linux Mint {0}"\nVERSION_ID="{0}"\nVERSION_CODENAME=x\nID=linuxmint\nID_LIKE="ubuntu debian"\nUBUNTU_CODENAME={1}\n'
+BOOKWORM, NOBLE = DEBIAN.format(12, "bookworm"), UBUNTU.format("24.04", "noble")
+# The os-release of each system that is tried, and which Fast DDS it has.
+TRIED = {
+    BOOKWORM: 2, DEBIAN.format(13, "trixie"): 3, NOBLE: 2, UBUNTU.format("26.04", "resolute"): 3, MINT.format(22, "noble"): 2,
+    'PRETTY_NAME="Debian GNU/Linux forky/sid"\nVERSION_CODENAME=forky\nID=debian\n': 3,
+    'PRETTY_NAME="LMDE 6 (faye)"\nID=linuxmint\nID_LIKE=debian\nVERSION_CODENAME=faye\nDEBIAN_CODENAME=bookworm\n': 2,
 }
+NAMES = "Debian 12, 13 and testing, Ubuntu 24.04 and 26.04"
+TOO_OLD = {"Debian GNU/Linux 11 (bullseye)": DEBIAN.format(11, "bullseye"), "Ubuntu 22.04 LTS": UBUNTU.format("22.04", "jammy"),
+           "Linux Mint 21": MINT.format(21, "jammy")}
+NO_DEBIAN = {"Fedora Linux 41": "ID=fedora\nVERSION_ID=41\nPRETTY_NAME='Fedora Linux 41'\n",
+             "unknown (no /etc/os-release)": None}
+# Newer than any that is known: with its name.
+NEWER = {"Debian GNU/Linux 16 (woody)": DEBIAN.format(16, "woody"), "Ubuntu 28.04 LTS": UBUNTU.format("28.04", "x"),
+         "Kali GNU/Linux Rolling": 'PRETTY_NAME="Kali GNU/Linux Rolling"\nID=kali\nVERSION_CODENAME=kali-rolling\nID_LIKE=debian\n'}
 # The output of apt-get of Debian 12 without a network, shortened.
 OFFLINE = """W: Failed to fetch http://deb.debian.org/debian/dists/bookworm/InRelease  Temporary failure resolving 'deb.debian.org'
 W: Some index files failed to download. They have been ignored, or old ones used instead.
@@ -49,34 +58,60 @@ class SetupTest(CheckoutTest):
                               cwd=self.folder, capture_output=True, text=True, timeout=60, check=False)
         return done.returncode, done.stdout + done.stderr, self.calls.read_text()
 
+    def install(self, release, *known):
+        """What setup says and installs on a system whose apt knows the packages `known`."""
+        self.stand_in("apt-cache", f'case " {" ".join(known)} " in *" $2 "*) echo "$2:" ;; esac')
+        code, said, calls = self.launch(release, "setup")
+        self.assertEqual(code, 0, said)
+        [install] = [line for line in calls.splitlines() if line.startswith("apt-get install")]
+        self.assertIn("libsimbody-dev", install.split())
+        return said, install.split()
+
     def test_each_system_gets_its_own_names(self):
-        for release, own, other in ((BOOKWORM, "libfastrtps-dev", "libfastdds-dev"),
-                                    (TRIXIE, "libfastdds-dev", "libfastrtps-dev")):
-            code, said, calls = self.launch(release, "setup")
+        for release, version in TRIED.items():
+            with self.subTest(release):
+                said, install = self.install(release)
+                self.assertEqual([name for name in install if re.match("libfast(rtps|dds)-dev", name)],
+                                 [{2: "libfastrtps-dev", 3: "libfastdds-dev"}[version]])
+                self.assertNotIn("not known", said)
+
+    def test_a_newer_system_gets_the_fast_dds_that_it_has_and_one_line_says_so(self):
+        for name, release in NEWER.items():
+            for known, expected in (((), "libfastdds-dev"), (("libfastrtps-dev",), "libfastrtps-dev"),
+                                    (("libfastrtps-dev", "libfastdds-dev"), "libfastdds-dev")):
+                with self.subTest(name, known=known):
+                    said, install = self.install(release, *known)
+                    self.assertIn(expected, install)
+                    self.assertEqual(said.splitlines()[0], f"sls: this system is {name}, which is not known here: taking "
+                                                           f"{expected} and the other packages of {NAMES}")
+
+    def test_ubuntu_is_given_no_chromium_which_is_a_snap_there(self):
+        self.release.write_text(NOBLE)
+        for release, is_asked in ((NOBLE, False), (BOOKWORM, True)):
+            code, said, calls = self.launch(release, "@install", "chromium", "mandoc")
             self.assertEqual(code, 0, said)
-            install = [line for line in calls.splitlines() if line.startswith("apt-get install")]
-            self.assertEqual(len(install), 1, calls)
-            self.assertIn(own, install[0].split())
-            self.assertIn("libsimbody-dev", install[0].split())
-            self.assertNotIn(other, install[0].split())
+            self.assertEqual("chromium" in re.search("apt-get install.*", calls)[0].split(), is_asked)
 
     def test_another_system_is_refused_in_one_line_and_nothing_is_installed(self):
-        for name, release in NOT_TRIED.items():
+        refused = {name: (release, f"{name}, whose packages are too old; tried are {NAMES}: fly in containers with ./sls docker-demo")
+                   for name, release in TOO_OLD.items()}
+        refused |= {name: (release, f"{name}; tried are {NAMES}. Elsewhere fly in containers with ./sls docker-demo, or install by "
+                                    f"hand what the lists at the top of {self.root}/sls name, then add --no-install")
+                    for name, release in NO_DEBIAN.items()}
+        for name, (release, expected) in refused.items():
             for command in ("setup", "demo", "report"):
                 with self.subTest(name, command=command):
                     code, said, calls = self.launch(release, command)
                     said = said.replace(str(self.release), "/etc/os-release")
-                    self.assertEqual((code, said), (1, (
-                        f"sls: error: this system is {name}; tried are Debian 12 and 13. Elsewhere install by hand "
-                        f"what the lists at the top of {self.root}/sls name, then add --no-install\n")))
+                    self.assertEqual((code, said), (1, f"sls: error: this system is {expected}\n"))
                     self.assertNotIn("apt-get", calls)
 
     def test_variables_of_the_caller_are_no_system(self):
-        self.environment |= {"ID": "debian", "VERSION_ID": "12"}
+        self.environment |= {"ID": "debian", "VERSION_CODENAME": "bookworm", "UBUNTU_CODENAME": "noble"}
         self.assertEqual(self.launch(None, "setup")[0], 1)
 
     def test_no_install_installs_nothing_on_any_system(self):
-        for release in (BOOKWORM, NOT_TRIED["Ubuntu 24.04.1 LTS"], None):
+        for release in (BOOKWORM, NO_DEBIAN["Fedora Linux 41"], None):
             for words in (("setup", "--no-install"), ("--no-install", "setup")):
                 code, said, calls = self.launch(release, *words)
                 self.assertEqual((code, said), (0, ""))
@@ -110,7 +145,7 @@ class SetupTest(CheckoutTest):
     def test_a_package_that_is_half_configured_is_one_line_with_the_way_out(self):
         self.said.write_text("E: dpkg was interrupted, you must manually run 'dpkg --configure -a' to correct the "
                              "problem. \n")
-        code, said, _ = self.launch(TRIXIE, "setup")
+        code, said, _ = self.launch(BOOKWORM, "setup")
         self.assertEqual(code, 1)
         self.assertIn("error: apt-get: dpkg was interrupted, you must manually run 'dpkg --configure -a'", said)
         self.assertEqual(len(said.splitlines()), 2, said)

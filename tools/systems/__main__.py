@@ -13,9 +13,11 @@ from results import say
 
 COMMANDS = ("demo", "test", "package")
 SYSTEMS = (*tree.CODENAMES, tree.ARM)
+USUAL = ("debian12", "debian13")
 VERSIONS = {
     "Debian": "cat /etc/debian_version",
     "Fast DDS": "dpkg-query -W -f '${Version}' libfastdds-dev 2>/dev/null || dpkg-query -W -f '${Version}' libfastrtps-dev",
+    "Eigen": "dpkg-query -W -f '${Version}' libeigen3-dev",
     "g++": "{ g++ -dumpfullversion || aarch64-linux-gnu-g++ -dumpfullversion; } 2>/dev/null",
     "CMake": "cmake --version | sed -n 's/cmake version //p'",
     "Python": "python3 --version 2>/dev/null | sed 's/Python //'",
@@ -29,7 +31,7 @@ table. In aarch64 it builds for ARM instead, and flies under qemu. Needs root. T
 machine: do not fly on it meanwhile. Nothing is mounted outside the systems, and they are deleted, also after Ctrl-C.
 Exit code 0: every command ended with 0, and the certificates are as they must be.""")
     parser.add_argument("system", nargs="*", metavar="SYSTEM",
-                        help=f"{', '.join(SYSTEMS[:-1])} or {SYSTEMS[-1]} (default: {' and '.join(tree.CODENAMES)})")
+                        help=f"{', '.join(SYSTEMS[:-1])} or {SYSTEMS[-1]} (default: {' and '.join(USUAL)})")
     parser.add_argument("--commands", default="demo,test", metavar="LIST",
                         help=f"the commands, of {', '.join(COMMANDS)} (default: demo,test)")
     parser.add_argument("--only", metavar="REGEX",
@@ -44,7 +46,7 @@ Exit code 0: every command ended with 0, and the certificates are as they must b
     parser.error = lambda message: fail(f"systems: {message}", 2)
     arguments = parser.parse_args(words)
     # The tests of a system fly with programs of the one before: ARM is the last.
-    arguments.system = sorted(dict.fromkeys(arguments.system or tree.CODENAMES), key=tree.ARM.__eq__)
+    arguments.system = sorted(dict.fromkeys(arguments.system or USUAL), key=tree.ARM.__eq__)
     arguments.commands = arguments.commands.split(",")
     for name, values, known in (("SYSTEM", arguments.system, SYSTEMS), ("--commands", arguments.commands, COMMANDS)):
         for value in values:

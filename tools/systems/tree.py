@@ -15,7 +15,7 @@ import subprocess
 import time
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-CODENAMES = {"debian12": "bookworm", "debian13": "trixie"}
+CODENAMES = {"debian12": "bookworm", "debian13": "trixie", "testing": "testing"}  # what debootstrap calls them
 ARM = "aarch64"  # a system, too: a Debian 12 that builds for ARM
 CHECKOUT = "sls"  # folder of the checkout in a tree; not in /root, which other users cannot enter
 BASE_DAYS = 30  # age at which a kept base is made anew
@@ -231,6 +231,11 @@ class Tree:
             self._make_here("packing", "tar", "-C", self.path, "-cf", part, ".")
             part.rename(base)
         self.variables = copy_settings(self.path)
+        if self.system == "testing":
+            # Testing loses packages for a while, as Fast DDS in November 2026: what it lacks comes from unstable.
+            apt = self.path / "etc/apt"
+            (apt / "sources.list.d/unstable.list").write_text(f"deb {find_mirror()} unstable main\n")
+            (apt / "preferences.d/unstable").write_text("Package: *\nPin: release a=unstable\nPin-Priority: 100\n")
 
     def _make_here(self, name, *command):
         self.check(name, self.run_here(name, *command))

@@ -272,7 +272,7 @@ class SystemsTest(unittest.TestCase):
         self.assertIn(f"not deleted: something is mounted at {place}\n", errors)
 
     def test_bad_usage_is_one_line(self):
-        self.expect_error(2, "systems: SYSTEM: expected one of debian12, debian13, aarch64, got 'debian11'", "debian11")
+        self.expect_error(2, "systems: SYSTEM: expected one of debian12, debian13, testing, aarch64, got 'debian11'", "debian11")
         self.expect_error(2, "systems: --commands: expected one of demo, test, package, got 'fly'", "--commands", "fly")
         self.expect_error(2, "systems: --limit-minutes: expected > 0, got 0", "--limit-minutes", "0")
         self.expect_error(2, "systems: --limit-minutes: expected > 0, got nan", "--limit-minutes", "nan")
