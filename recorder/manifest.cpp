@@ -51,7 +51,8 @@ Json list_math_features() {
 Json describe_machine() {
   utsname name{};
   uname(&name);
-  return {{"processor", read_cpu_info("model name")},
+  return {{"system", app::system_name()},
+          {"processor", read_cpu_info("model name")},
           {"architecture", name.machine},
           {"features", list_math_features()},
           {"libc", std::string("glibc ") + gnu_get_libc_version()},
@@ -201,7 +202,8 @@ void write_manifest(const std::filesystem::path& folder, const Manifest& manifes
       {"versions",
        {{"recorder", app::version()},
         {"sim_server", parameters.version().to_string()},
-        {"fast_dds", bus::middleware_version()}}},
+        {"fast_dds", bus::middleware_version()},
+        {"eigen", app::eigen_version()}}},
       {"machine", describe_machine()},
       {"files", files},
       {"missing", missing},

@@ -6,6 +6,7 @@
 #include <net/if.h>
 #include <pwd.h>
 #include <spdlog/fmt/fmt.h>
+#include <spdlog/fmt/ranges.h>  // join
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <unistd.h>

@@ -247,11 +247,11 @@ def describe_gains(scenario: dict[str, Any]) -> str:
 
 def describe_programs(manifest: dict[str, Any]) -> str:
     versions = manifest.get("versions", {})
-    return f"{versions.get('sim_server', '–')}, Fast DDS {versions.get('fast_dds', '–')}"
+    return f"{versions.get('sim_server', '–')}, Fast DDS {versions.get('fast_dds', '–')}, Eigen {versions.get('eigen', '–')}"
 
 
 def describe_machine(machine: dict[str, Any]) -> str:
-    return ", ".join(str(machine[key]) for key in ("processor", "architecture", "libc")
+    return ", ".join(str(machine[key]) for key in ("system", "processor", "architecture", "libc")
                      if machine.get(key)) or "–"
 
 

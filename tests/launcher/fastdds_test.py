@@ -93,8 +93,8 @@ class FastDdsTest(FolderTest):
         self.expect_taken("major 3, target fastdds", prefixes=["three"])
 
     def test_none_is_one_line_that_names_the_packages(self):
-        expected = ("Fast DDS: expected fastrtps 2.9 (Debian 12: libfastrtps-dev) or fastdds 3 (Debian 13: "
-                    "libfastdds-dev), got ")
+        expected = ("Fast DDS: expected fastrtps 2.9 (Debian 12, Ubuntu 24.04: libfastrtps-dev) or fastdds 3 (later "
+                    "ones: libfastdds-dev), got ")
         self.expect_error(expected + "nothing")
         self.add("two", "fastrtps", "2.6.4")
         self.expect_error(expected + "2.6.4")

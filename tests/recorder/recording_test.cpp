@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "common/app/version.hpp"
 #include "common/text/sha256.hpp"
 #include "tests/recorder/csv_table.hpp"
 #include "tests/recorder/file_size_limit.hpp"
@@ -205,6 +206,8 @@ TEST_F(RecordingTest, TheManifestDescribesTheRunTheMachineAndEveryFile) {
   EXPECT_FALSE(manifest.at("versions").at("fast_dds").get<std::string>().empty());
   EXPECT_NE(manifest.at("machine").at("libc").get<std::string>().find("glibc"), std::string::npos);
   EXPECT_TRUE(manifest.at("machine").contains("processor"));
+  EXPECT_EQ(manifest.at("versions").at("eigen"), app::eigen_version());
+  EXPECT_EQ(manifest.at("machine").at("system"), app::system_name());
 
   // The manifest lists all files and no others, each with its hash; CSV files also with their rows.
   std::set<std::string> there, listed;

@@ -23,7 +23,7 @@ std::string name_ports(const Observations& seen);
 bool is_of_peer(const Observations& seen, const std::string& address);
 bool is_of_peer(const Observations& seen, const Program& program);
 
-/// Shared memory, users, network, ports, multicast, datagrams, discovery: machine_checks.cpp.
+/// Versions, shared memory, users, network, ports, multicast, datagrams, discovery: machine_checks.cpp.
 std::vector<Check> check_machine(const Observations& seen);
 /// Domain, security, types, QoS, data, clock: domain_checks.cpp. `is_explained`: a check of the
 /// machine has a finding, which explains missing data.

@@ -4,7 +4,9 @@
 #include <set>
 #include <sstream>
 
+#include "common/app/version.hpp"
 #include "common/bus/environment.hpp"
+#include "common/bus/node.hpp"
 #include "common/config/yaml_node.hpp"
 #include "tools/doctor/diagnosis_parts.hpp"
 
@@ -213,11 +215,18 @@ Check check_discovery(const Observations& seen) {
                      "SLS_DISCOVERY_SERVER");
 }
 
+Check tell_versions() {
+  return ok("versions", app::version() + " with Fast DDS " + bus::middleware_version() +
+                            " and Eigen " + app::eigen_version() + " on " +
+                            config::to_printable(app::system_name()));
+}
+
 }  // namespace
 
 std::vector<Check> check_machine(const Observations& seen) {
-  return {check_shared_memory(seen), check_users(seen),     check_network(seen),  check_ports(seen),
-          check_multicast(seen),     check_datagrams(seen), check_discovery(seen)};
+  return {tell_versions(),       check_shared_memory(seen), check_users(seen),
+          check_network(seen),   check_ports(seen),         check_multicast(seen),
+          check_datagrams(seen), check_discovery(seen)};
 }
 
 }  // namespace sls::doctor

@@ -35,8 +35,8 @@ if(NOT (fastdds_FOUND OR fastrtps_FOUND))
   if(NOT found)
     set(found nothing)
   endif()
-  message(FATAL_ERROR "Fast DDS: expected fastrtps 2.9 (Debian 12: libfastrtps-dev) or fastdds 3 (Debian 13: "
-                      "libfastdds-dev), got ${found}")
+  message(FATAL_ERROR "Fast DDS: expected fastrtps 2.9 (Debian 12, Ubuntu 24.04: libfastrtps-dev) or fastdds 3 (later "
+                      "ones: libfastdds-dev), got ${found}")
 endif()
 set(version ${${sls_fastdds_target}_VERSION})
 set(place ${${sls_fastdds_target}_DIR})
