@@ -7,6 +7,8 @@ import pathlib
 import re
 import unittest
 
+import yaml
+
 from places import ROOT
 from sls.launcher.commands import COMMANDS
 
@@ -90,6 +92,20 @@ class ArchitectureTest(unittest.TestCase):
     def test_the_readme_is_short_and_its_picture_small(self):
         self.assertLessEqual(len(read("README.md").splitlines()), 150)
         self.assertLess((ROOT / "docs/pictures/live.png").stat().st_size, 300_000)
+
+    def test_the_files_that_a_forge_reads_are_right(self):
+        [version] = re.findall(r"^project\(sls VERSION ([\d.]+)", read("CMakeLists.txt"), re.MULTILINE)
+        citation = yaml.safe_load(read("CITATION.cff"))
+        self.assertEqual((citation["cff-version"], citation["type"], citation["version"], citation["license"]),
+                         ("1.2.0", "software", version, "Apache-2.0"))
+        self.assertTrue(citation["authors"] and citation["title"] and citation["message"])
+        jobs = yaml.safe_load(read(".github/workflows/ci.yml"))["jobs"]
+        self.assertEqual({jobs["ubuntu"]["runs-on"], jobs["debian"]["container"]["image"]},
+                         {"ubuntu-24.04", "debian:${{ matrix.version }}"})
+        self.assertEqual([job["steps"][-1]["run"] for job in jobs.values()], ["bash .ci/run"] * 2)
+        forms = {path.stem: yaml.safe_load(path.read_text()) for path in (ROOT / ".github/ISSUE_TEMPLATE").iterdir()}
+        self.assertTrue(all(form["name"] and form["description"] and form["body"] for form in forms.values()))
+        self.assertIn("./sls doctor", str(forms["fault"]))
 
     def test_the_commands_of_the_readme_exist(self):
         commands = re.findall(r"\./sls ([a-z][\w-]*)", read("README.md"))
