@@ -171,8 +171,8 @@ say_size() {
 # Fast DDS that is asked for; false if none, copied or moved.
 has_tree() {
   [[ -f $1/build.ninja && -f $1/CMakeCache.txt ]] &&
-    [[ $(grep -cxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$root" -e CMAKE_GENERATOR:INTERNAL=Ninja \
-      -e "SLS_MADE_ON:STRING=$(describe_place)" "$1/CMakeCache.txt") == 3 ]]
+    [[ $(grep -cxF -e "CMAKE_HOME_DIRECTORY:INTERNAL=$root" -e CMAKE_GENERATOR:INTERNAL=Ninja "$1/CMakeCache.txt") == 2 ]] &&
+    ! grep '^SLS_MADE_ON:STRING=.' "$1/CMakeCache.txt" | grep -qvxF "SLS_MADE_ON:STRING=$(describe_place)"
 }
 
 # describe_place: the system and the folder of Fast DDS that a build tree is made for.
@@ -180,7 +180,7 @@ describe_place() {
   (
     unset ID VERSION_ID VERSION_CODENAME
     [[ ! -r /etc/os-release ]] || . /etc/os-release
-    echo "${ID:-} ${VERSION_ID:-${VERSION_CODENAME:-}} ${SLS_FASTDDS_PREFIX:-}"
+    echo "${ID:-} ${VERSION_ID:-${VERSION_CODENAME:-}}${SLS_FASTDDS_PREFIX:+ $SLS_FASTDDS_PREFIX}"
   )
 }
 
@@ -237,9 +237,9 @@ show_progress() {
 # values, and leave out a sanitizer. Then the tree is made anew.
 configure() {
   local said status=0
-  said="$(cmake --preset "$@" "-DSLS_MADE_ON=$(describe_place)" 2>&1)" || status=$?
+  said="$(cmake --preset "$@" "-DSLS_MADE_ON:STRING=$(describe_place)" 2>&1)" || status=$?
   printf '%s\n' "$said"
-  [[ $said != *'require your cache to be deleted'* ]] || { cmake --preset "$1" --fresh "-DSLS_MADE_ON=$(describe_place)"; return; }
+  [[ $said != *'require your cache to be deleted'* ]] || { cmake --preset "$1" --fresh "-DSLS_MADE_ON:STRING=$(describe_place)"; return; }
   return "$status"
 }
 

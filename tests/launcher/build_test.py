@@ -179,6 +179,17 @@ add_dependencies(flight long)
         self.expect_built("copy", copy)
         self.assertEqual(self.expect_flight("first")[1:], [])
 
+    def test_a_tree_of_an_earlier_system_or_of_another_fast_dds_is_made_anew(self):
+        self.expect_built("first")
+        cache = self.root / "build/CMakeCache.txt"
+        cache.write_text(re.sub("(?m)^(SLS_MADE_ON:STRING=).*$", r"\1debian 9", cache.read_text()))
+        self.assertIn("debian 9", cache.read_text())
+        for _ in ("the system is newer", "SLS_FASTDDS_PREFIX is set"):
+            calls = self.expect_flight("first")
+            self.assertEqual([call for call in calls if "--fresh" in call][0].split()[1:4], ["--preset", "flight", "--fresh"])
+            self.expect_not_built("first")
+            self.environment["SLS_FASTDDS_PREFIX"] = str(self.folder)
+
     def test_flights_that_start_together_build_one_after_the_other(self):
         # Two Ninjas in one folder would spoil its files.
         self.write("CMakeLists.txt", CMAKE + """add_custom_command(OUTPUT stamp COMMAND sh -c

@@ -125,6 +125,16 @@ class EnvironmentTest(FolderTest):
                     if variables is ROS:
                         self.assertIn(f", the system's; not that in {self.folder}/ros: SLS_FASTDDS_PREFIX={self.folder}/ros in the "
                                       "environment takes it\n", said)
+        with self.subTest("a program of the user's with another Eigen than the libraries"):
+            self.write("CMakeLists.txt", "cmake_minimum_required(VERSION 3.25)\nproject(small LANGUAGES CXX)\n"
+                                         "find_package(sls REQUIRED)\n")
+            self.write("ros/share/eigen3/cmake/Eigen3Config.cmake", "set(Eigen3_FOUND TRUE)\n")
+            self.write("ros/share/eigen3/cmake/Eigen3ConfigVersion.cmake",
+                       "set(PACKAGE_VERSION 9.1)\nset(PACKAGE_VERSION_COMPATIBLE TRUE)\n")
+            done = subprocess.run(["cmake", "-S", self.folder, "-B", self.folder / "small", f"-Dsls_DIR={checkout}/build",
+                                   f"-DEigen3_DIR={self.folder}/ros/share/eigen3/cmake"], capture_output=True, text=True,
+                                  timeout=200, check=False)
+            self.assertRegex(" ".join(done.stderr.split()), r"Eigen3: expected [\d.]+, with which sls was built, got 9\.1 in ")
         with self.subTest("flags that move bits, given to CMake"):
             done = subprocess.run(["cmake", "--preset", "flight", "-B", self.folder / "other"], cwd=checkout, capture_output=True,
                                   env={**os.environ, "CXXFLAGS": "-O2 -ffast-math"}, text=True, timeout=200, check=False)
