@@ -140,7 +140,7 @@ class BuildTest(CheckoutTest):
             self.expect_not_built(text)
 
     def test_a_first_flight_builds_what_it_needs_and_a_whole_tree_stays_whole(self):
-        self.assertIn("cmake --preset flight --fresh", self.expect_flight("first"))
+        self.assertTrue(any(call.startswith("cmake --preset flight --fresh") for call in self.expect_flight("first")))
         done = subprocess.run([self.root / "sls", "verify"], env=self.environment, cwd=self.folder, capture_output=True,
                               text=True, timeout=200, check=False)
         self.assertEqual((done.returncode, done.stdout), (0, "first\n"), done.stderr)

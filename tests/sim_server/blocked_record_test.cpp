@@ -111,7 +111,7 @@ TEST(BlockedRecordTest, TheEndOfTheStreamDoesNotWaitForEachBatch) {
   bus::Writer<RecordBatch> writer(node);
   ASSERT_TRUE(wait_until([&] { return reader.is_matched() && !writer.matched().empty(); }));
   RecordStream stream(writer, 100, 1);  // less than an entry: each one is a batch
-  const model::StepRecord record;
+  const model::StepRecord record{};
   stream.add_step(std::vector<model::StepRecord>(kManySamples, record));
   EXPECT_TRUE(ends(reader, [&] { stream.end(); }));
   EXPECT_GT(stream.lost(), kManySamples / 2) << "the batches that were not tried count, too";
