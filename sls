@@ -15,7 +15,7 @@ readonly flight_packages=(g++ ninja-build cmake libeigen3-dev libsimbody-dev lib
 readonly packages=(make libgtest-dev openssl pybind11-dev python3-dev python3-numpy libboost-dev)
 readonly fuzz_packages=(clang libclang-rt-dev llvm)
 readonly test_packages=(libgmock-dev libmpfr-dev python3-clang python3-mpmath iproute2 nftables cyclonedds-dev
-  cyclonedds-tools fastdds-tools libfaketime python3-pandas python3-pytest python3-venv slurm-wlm munge
+  cyclonedds-tools fastdds-tools libfaketime locales python3-pandas python3-pytest python3-venv slurm-wlm munge
   python3-distributed chromium mandoc debootstrap
   debian-archive-keyring mmdebstrap git codespell)
 readonly python_packages=(python3-numpy python3-scipy python3-matplotlib python3-yaml)

@@ -145,7 +145,7 @@ class BuildTest(CheckoutTest):
                               text=True, timeout=200, check=False)
         self.assertEqual((done.returncode, done.stdout), (0, "first\n"), done.stderr)
         self.write("text.h", '#define TEXT "header"\n')
-        self.assertIn("cmake --preset release", self.expect_flight("header"))
+        self.assertTrue(any(call.startswith("cmake --preset release") for call in self.expect_flight("header")))
         self.expect_not_built("header")
 
     def test_a_long_build_says_how_far_it_is_by_the_lines_of_its_files_once_a_tenth_is_done(self):

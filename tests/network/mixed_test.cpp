@@ -135,15 +135,19 @@ TEST_P(MixedNetworkTest, OnALinkThatLosesFivePercent) {
   EXPECT_GT(network_->lost(), 50u);
 }
 
-TEST_P(MixedNetworkTest, ASecuredFlightIsRefusedByBothSides) {
+// Fast DDS 2.9 and 2.11 announce themselves alike, 2.13 and later in another way (trap 38).
+TEST_P(MixedNetworkTest, ASecuredFlightIsRefusedByBothSidesOrTheSame) {
   const Profile configured(*network_, "secure");
   Flight flight(scenario("short"), mix(configured.flight_options()));
   const std::string defect = ": expected one version in a secured flight\n";
-  EXPECT_TRUE(wait_until([&] {
+  const auto is_refused = [&] {
     for (const auto* program : {&flight.server, &flight.client, &flight.recorder})
       if ((*program)->output().find(defect) == std::string::npos) return false;
     return true;
-  })) << flight.outputs();
+  };
+  EXPECT_TRUE(wait_until([&] { return is_refused() || !flight.server->is_running(); }))
+      << flight.outputs();
+  if (!is_refused()) expect_same(flight, scenario("short"));
 }
 
 TEST_P(MixedNetworkTest, WithADiscoveryServer) {

@@ -146,6 +146,7 @@ bool is_parameter_whole(std::uint64_t number, const Fields& content) {
     case 0x0005:  // names of topic, type and entity
     case 0x0007:
     case 0x0062:
+    case 0x8003:  // number of a machine, of Fast DDS
       lists.skip_text();
       break;
     case 0x0029:  // partitions
@@ -168,6 +169,13 @@ bool is_parameter_whole(std::uint64_t number, const Fields& content) {
     case 0x8006:  // domains of shared data, of Fast DDS
       lists.skip_elements(8);
       break;
+    case 0x8101:  // how Fast DDS publishes: a number, the name of its flow controller
+      lists = Lists(content, 4);
+      lists.skip_text();
+      break;
+    case 0x8010:  // endpoints and wire protocol: Fast DDS 3.2 and 3.3 bound none of their lists of
+    case 0x8300:  // locators, and send them only with fastdds.serialize_optional_qos
+      return false;
     case 0x1001:  // identity, permissions and their states
     case 0x1002:
     case 0x1003:
@@ -238,7 +246,8 @@ const char* judge_data(const Fields& fields, std::uint8_t flags) {
   if (place == 0 || ((flags & (kHasData | kHasKey)) != 0 && place == fields.size()))
     return "a DATA that is cut off";
   if (!is_number(fields.read_number(kNumber))) return "a DATA without number";
-  return (flags & kHasData) != 0 ? judge_sample(fields, place) : nullptr;
+  // Since 3.3 Fast DDS reads a key as it reads data.
+  return (flags & (kHasData | kHasKey)) != 0 ? judge_sample(fields, place) : nullptr;
 }
 
 const char* judge_fragment(const Fields& fields, std::uint8_t flags) {

@@ -96,9 +96,10 @@ class GuardedType : public CodedType<Generated> {
       read_message(cdr, *static_cast<Message*>(data));
     } catch (const eprosima::fastcdr::exception::NotEnoughMemoryException&) {
       return refuse(payload, data, "expected more bytes, got " + std::to_string(payload.length));
+    } catch (const eprosima::fastcdr::exception::Exception& error) {
+      return refuse_content(payload, data, error.what());  // no std::exception since Fast CDR 2.3
     } catch (const std::exception& error) {
-      return refuse(payload, data,
-                    std::string("expected plain CDR of that type, got: ") + error.what());
+      return refuse_content(payload, data, error.what());
     }
     const std::size_t used = count_bytes(cdr);
     if (payload.length - used > kMostPadding)
@@ -120,6 +121,11 @@ class GuardedType : public CodedType<Generated> {
 
  private:
   static constexpr std::size_t kMostPadding = 3;  // to a multiple of four
+
+  bool refuse_content(const rtps::SerializedPayload_t& payload, void* data,
+                      const char* reason) const {
+    return refuse(payload, data, std::string("expected plain CDR of that type, got: ") + reason);
+  }
 
   bool refuse(const rtps::SerializedPayload_t& payload, void* data,
               const std::string& defect) const {

@@ -4,6 +4,7 @@ import importlib.util
 import os
 import re
 import shutil
+import subprocess
 from collections.abc import Callable
 from typing import NoReturn
 
@@ -206,9 +207,12 @@ def discovery_server(words: list[str]) -> NoReturn:
         call_script("@setup", "fastdds-tools")
     say(f"discovery server on port {options.port}; clients: "
         f"SLS_DISCOVERY_SERVER={options.listen or 'this machine'}")
+    # Since Fast DDS 3.2 the program wants the number by which `fastdds discovery` asks for a server.
+    asked = subprocess.run(["fast-discovery-server", "-v"], capture_output=True, text=True, check=False)
+    number = ["42"] if "Invalid command index" in asked.stderr else []
     # Number 0 has the identity that discovery_server.xml expects.
     listen = ["-l", options.listen] if options.listen else []
-    replace_by("fast-discovery-server", "-i", "0", *listen, "-p", options.port)
+    replace_by("fast-discovery-server", *number, "-i", "0", *listen, "-p", options.port)
 
 
 def network_table(words: list[str]) -> NoReturn:

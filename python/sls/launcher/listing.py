@@ -2,6 +2,7 @@
 
 import re
 import shutil
+import sys
 import textwrap
 
 from sls.launcher.arguments import Parser
@@ -36,7 +37,8 @@ def print_list(words: list[str]) -> int:
     parts = {f"{kind.capitalize()}: {use}": {name: describe(kind, name) for name in list_names(kind)}
              for kind, use in (("scenarios", "./sls run NAME"), ("campaigns", "./sls campaign NAME"))}
     parts |= {"Laws: controller.law in a scenario": LAWS, "Plants: plant.model in a scenario": PLANTS}
-    width = shutil.get_terminal_size((10**6, 0)).columns  # a pipe takes lines of any length
+    # A pipe takes lines of any length. Since Python 3.14 the size is that of a terminal at stderr, too.
+    width = shutil.get_terminal_size().columns if sys.stdout.isatty() else 10**6
     for title, entries in parts.items():
         print(title)
         longest = max(map(len, entries))

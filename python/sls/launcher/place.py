@@ -80,6 +80,12 @@ def printing() -> Iterator[None]:
             sys.stdout.flush()
     except BrokenPipeError:
         drop(1)
+    except OSError:
+        try:
+            sys.stdout.flush()
+        except OSError:
+            drop(1)  # else Python 3.14 fails again at its end and makes the exit code 120
+        raise
 
 
 def show(text: str) -> None:

@@ -139,7 +139,7 @@ TEST(DiagnosisTest, AMachineThatDoesNotReachItselfIsNamed) {
   Observations seen;
   seen.probes.is_tried = seen.probes.is_unreachable = true;
   seen.peer_address = "127.0.0.1";
-  EXPECT_EQ(diagnose(seen)[2].text,
+  EXPECT_EQ(diagnose(seen)[3].text,
             "this machine does not reach itself at 127.0.0.1: the interface "
             "is down: ip link set lo up");
 }

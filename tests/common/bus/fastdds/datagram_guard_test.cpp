@@ -99,6 +99,22 @@ TEST(DatagramGuardTest, HarmfulMessagesAreRefused) {
       {"property", announce("59000c0001000000ffffffff61000000"), malformed},
       {"representations", announce("73000800ffffffff00000000"), malformed},
       {"shared data", announce("06800c00020000000000000000000000"), malformed},
+      {"machine",
+       announce("0380080004000000616263"
+                "00"),
+       ""},
+      {"of 4 GB", announce("03800800ffffffff61000000"), malformed},
+      {"flow controller",
+       announce("01810c0000000000"
+                "0200000061000000"),
+       ""},
+      {"of 4 GB", announce("01810c0000000000fcffffff61000000"), malformed},
+      {"locators of an endpoint", announce("10800400ffffffff"), malformed},
+      {"of the wire protocol", announce("00830400ffffffff"), malformed},
+      {"key instead of data", replace(announce("05000800ffffffff61000000"), "1505", "1509"),
+       malformed},
+      {"of a participant that leaves",
+       "1509000000001000" + kAnnouncer + kOne + "00030000" + kGuid + kEnd, ""},
       {"in one fragment",
        replace(kFragment, kEntities, kWriters) +
            "0100000001001000100000000003000005000800ffffffff00000000",

@@ -53,8 +53,12 @@ Message read_generated(std::string bytes) {
   eprosima::fastcdr::FastBuffer buffer(bytes.data(), bytes.size());
   Cdr cdr = make_cdr(buffer);
   Message message;
-  cdr.read_encapsulation();
-  read_message(cdr, message);
+  try {
+    cdr.read_encapsulation();
+    read_message(cdr, message);
+  } catch (const eprosima::fastcdr::exception::Exception& error) {
+    ADD_FAILURE() << error.what();
+  }
   return message;
 }
 

@@ -160,7 +160,7 @@ TEST_F(WebSocketTest, ClosesOnFramesThatBreakTheProtocol) {
            {"close with code 999", to_bytes({kClose, "\x03\xe7"}), 1002},
            {"size of 1 in 2 bytes", std::string("\x81\xfe\0\1\0\0\0\0x", 9), 1002},
            {"size of 1 in 8 bytes", std::string("\x81\xff\0\0\0\0\0\0\0\1\0\0\0\0x", 15), 1002},
-           {"size of 2^63", to_bytes({kBinary, "x", true, 0, true, 1ull << 63}), 1009},
+           {"size of 2^63", to_bytes({kBinary, "x", true, 0, true, 1ull << 63}), 1002},
            {"size of 2^63 - 1", to_bytes({kBinary, "x", true, 0, true, (1ull << 63) - 1}), 1009},
            {"size of 65,537", to_bytes({kBinary, "x", true, 0, true, 65'537}), 1009},
            {"64 kB and 1 in fragments",
@@ -171,7 +171,10 @@ TEST_F(WebSocketTest, ClosesOnFramesThatBreakTheProtocol) {
            {"UTF-8 cut at the end", to_bytes({kText, "\xe2\x82"}), 1007}}) {
     RawClient client = open();
     client.send(bytes);
-    EXPECT_EQ(client.read_close_code(), code) << name;
+    const int got = client.read_close_code();
+    // RFC 6455 knows no such size; Boost before 1.92 calls it too large.
+    EXPECT_TRUE(got == code || (name == std::string("size of 2^63") && got == 1009))
+        << name << ": " << got;
     EXPECT_TRUE(client.ends()) << name;
     EXPECT_EQ(ask(other, name), name) << "another client is served on";
   }
