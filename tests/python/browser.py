@@ -6,7 +6,7 @@ import shutil
 import subprocess
 import tempfile
 
-PROGRAM = shutil.which("chromium")
+PROGRAM = shutil.which("chromium") or shutil.which("google-chrome")
 MISSING = "skipped: no Chromium (apt-get install chromium)"
 
 # Fewer processes; the software GPU draws only the scene. Chromium then warns of its own ReadPixels.
