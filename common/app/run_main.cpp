@@ -7,12 +7,15 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cctype>
 #include <cerrno>
 #include <exception>
 #include <new>
 #include <regex>
 #include <sstream>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include "common/app/log.hpp"
 #include "common/app/stop_signal.hpp"
@@ -91,9 +94,60 @@ std::string describe_usage_error(const CLI::ParseError& error, const CLI::App& c
   return text;
 }
 
+/// An option's line of CLI11 since 2.5 as earlier versions write it.
+std::string to_earlier_line(std::string line) {
+  const std::regex start("  (?:(-\\w), {5}| {8})(--.*)"),
+      default_value("(.*) \\[([^\\]]*)\\](| \\(Env:\\w+\\))");
+  std::smatch found;
+  if (!std::regex_match(line, found, start)) return line;
+  std::string spec = std::regex_replace(found[2].str(), std::regex(" +\\(Env:"), " (Env:");
+  const std::size_t gap = std::min(spec.find("  "), spec.size());
+  const std::string meaning = spec.substr(std::min(spec.find_first_not_of(' ', gap), spec.size()));
+  spec = spec.substr(0, gap);
+  line = found[1].matched ? "  " + found[1].str() + "," : "  ";
+  std::smatch value;
+  const bool has_default = std::regex_match(spec, value, default_value) &&
+                           value[1].str().rfind(" in") != value[1].length() - 3;  // that is a range
+  line += has_default ? value[1].str() + "=" + value[2].str() + value[3].str() : spec;
+  constexpr std::size_t kMeaning = 30;
+  if (meaning.empty()) return line;
+  return line +
+         (line.size() + 2 > kMeaning ? "\n" + std::string(kMeaning, ' ')
+                                     : std::string(kMeaning - line.size(), ' ')) +
+         meaning;
+}
+
+/// Help of CLI11 since 2.5 in the form of earlier versions, which the documents have.
+std::string to_earlier_form(const std::string& help) {
+  const std::regex title("(OPTIONS|POSITIONALS|SUBCOMMANDS):");
+  std::istringstream lines(help);
+  std::vector<std::string> before;
+  std::string text;
+  for (std::string line; std::getline(lines, line);) {
+    line.erase(line.find_last_not_of(' ') + 1);
+    if (std::regex_match(line, title)) {
+      if (!before.empty()) {  // the description, then the usage
+        const std::string usage = before.back();
+        before.pop_back();
+        for (const std::string& words : before) text += words + "\n";
+        text += "Usage: " + usage + "\n\n";
+        before.clear();
+      }
+      std::transform(line.begin() + 1, line.end(), line.begin() + 1,
+                     [](unsigned char letter) { return std::tolower(letter); });
+      text += line + "\n";
+    } else if (text.empty()) {
+      if (!line.empty()) before.push_back(line);
+    } else {
+      text += to_earlier_line(line) + "\n";
+    }
+  }
+  return text.empty() ? help : text;  // without such a title it has the form
+}
+
 /// CLI11's help text with lines of at most 80 columns where words allow.
 std::string fit(const std::string& help) {
-  std::istringstream lines(help);
+  std::istringstream lines(to_earlier_form(help));
   std::string text;
   for (std::string line; std::getline(lines, line); text += line + "\n") {
     // An option and its meaning are apart by two spaces at least.
