@@ -245,12 +245,12 @@ configure() {
 
 # build_tree PRESET FOLDER [TARGET…]: configures and builds; all targets by default.
 build_tree() {
-  clean_build
   local preset=$1 folder=$2 targets=() fresh=() lock log="$2/build.log" began configured
   shift 2
   (($#)) && targets=(--target "$@")
   { mkdir -p "$folder" && : >>"$folder/lock"; } 2>/dev/null ||
     fail "$folder: expected a folder of yours to build in, got one that user $(id -un) cannot write: copy the checkout"
+  clean_build
   exec {lock}>"$folder/lock"
   flock "$lock"  # Ninja's files do not survive two builds of one folder at once
   began=$SECONDS
