@@ -106,8 +106,9 @@ std::string to_earlier_line(std::string line) {
   spec = spec.substr(0, gap);
   line = found[1].matched ? "  " + found[1].str() + "," : "  ";
   std::smatch value;
-  const bool has_default = std::regex_match(spec, value, default_value) &&
-                           value[1].str().rfind(" in") != value[1].length() - 3;  // that is a range
+  const bool has_default =
+      std::regex_match(spec, value, default_value) &&
+      !std::regex_match(value[1].str(), std::regex(".* in"));  // that is a range
   line += has_default ? value[1].str() + "=" + value[2].str() + value[3].str() : spec;
   constexpr std::size_t kMeaning = 30;
   if (meaning.empty()) return line;

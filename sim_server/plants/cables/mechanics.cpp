@@ -235,7 +235,7 @@ Vector apply_impact(const System& system, double restitution, const Members& can
   for (int rebounds = 0;; ++rebounds) {
     calc_geometry(system, motion, candidates, geometry);
     if (rebounds == 0) calc_matrix(system, geometry, candidates, matrix);
-    Vector offset;
+    Vector offset{};
     double fastest = 0.0, largest = 0.0;
     for (const std::size_t i : candidates) {
       offset[i] = -geometry.stretch_rate[i];
