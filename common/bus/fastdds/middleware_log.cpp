@@ -51,8 +51,11 @@ std::string MiddlewareLog::find_first_error() {
 }
 
 std::string trim_place(const std::string& message) {
-  // "sls/state topic not found in allow rule. (./src/cpp/…/Permissions.cpp:1133)"
-  std::string text = message.substr(0, message.find(" (./src/"));
+  // "sls/state topic not found in allow rule. (./src/cpp/…/Permissions.cpp:1133)"; the folder
+  // before src/ depends on who built the library.
+  const std::size_t source = message.find("/src/cpp/");
+  std::string text =
+      message.substr(0, source == message.npos ? source : message.rfind(" (", source));
   while (!text.empty() && (text.back() == '\n' || text.back() == '.' || text.back() == ' '))
     text.pop_back();
   return text;

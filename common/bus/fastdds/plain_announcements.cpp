@@ -150,9 +150,10 @@ std::optional<PlainAnnouncement> find_announcement(const std::uint8_t* message, 
 }
 
 bool has_secure_announcements(const std::string& version) {
-  int major = 0, minor = 0;
-  std::sscanf(version.c_str(), "%d.%d", &major, &minor);
-  return major > 2 || (major == 2 && minor >= 13);
+  int major = 0, minor = 0, patch = 0;
+  std::sscanf(version.c_str(), "%d.%d.%d", &major, &minor, &patch);
+  if (major != 2 || minor > 12) return major >= 2;
+  return minor >= 10 && patch >= (minor == 12 ? 2 : 3);  // its last releases got it, too
 }
 
 }  // namespace sls::bus

@@ -100,10 +100,10 @@ TEST(PlainAnnouncementsTest, MessagesOfAnyLengthAreReadWithinTheirBounds) {
     }
 }
 
-TEST(PlainAnnouncementsTest, VersionsSince2_13HaveTheSecureWriter) {
-  for (const char* version : {"2.13.0", "2.14.3", "3.1.2"})
+TEST(PlainAnnouncementsTest, VersionsSince2_13AndTheLastBeforeHaveTheSecureWriter) {
+  for (const char* version : {"2.10.3", "2.11.3", "2.12.2", "2.13.0", "2.14.3", "3.1.2"})
     EXPECT_TRUE(has_secure_announcements(version)) << version;
-  for (const char* version : {"2.9.1", "2.11.2", "", "x"})
+  for (const char* version : {"2.9.1", "2.9.4", "2.10.2", "2.11.2", "2.12.1", "", "x"})
     EXPECT_FALSE(has_secure_announcements(version)) << version;
 }
 

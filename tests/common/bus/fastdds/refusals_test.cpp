@@ -9,6 +9,7 @@
 #include <algorithm>
 #include <sstream>
 
+#include "common/bus/fastdds/middleware_log.hpp"
 #include "common/bus/fastdds/participant_listener.hpp"
 #include "tests/support/waiting.hpp"
 
@@ -60,6 +61,13 @@ TEST_F(RefusalsTest, AreAlsoReadFromTheLogAlone) {
       "permissions file (./src/cpp/security/accesscontrol/Permissions.cpp:565)).");
   EXPECT_EQ(said_.str(),
             "refused 'recorder': its permissions are not signed by our permissions authority\n");
+}
+
+TEST_F(RefusalsTest, ThePlaceInTheSourcesIsLeftOut) {
+  for (const std::string folder : {".", "/tmp/build/dds"})
+    EXPECT_EQ(trim_place("no rule. (" + folder + "/src/cpp/security/Permissions.cpp:1)"),
+              "no rule");
+  EXPECT_EQ(trim_place("no rule (of ours)."), "no rule (of ours)");
 }
 
 TEST_F(RefusalsTest, AParticipantWithoutProofIsReportedInTime) {
