@@ -37,14 +37,24 @@ readonly of_builds=(CC CXX CFLAGS CXXFLAGS CPPFLAGS LDFLAGS CPATH C_INCLUDE_PATH
   LD_RUN_PATH GCC_EXEC_PREFIX COMPILER_PATH CMAKE_GENERATOR CMAKE_TOOLCHAIN_FILE CMAKE_PREFIX_PATH CMAKE_PROGRAM_PATH
   CMAKE_INCLUDE_PATH CMAKE_LIBRARY_PATH)
 
-# clean_build: a build gets none of these; says so once.
+# clean_build: a build gets none of these, and no programs from the folder of another Python, whose cmake would find its
+# libraries. Puts what it has dropped into `dropped`.
+dropped=()
 clean_build() {
-  local name dropped=()
+  local name folder folders kept=()
   for name in "${of_builds[@]}"; do
     [[ -z ${!name:-} ]] || dropped+=("$name")
     unset "$name"
   done
-  ((${#dropped[@]} == 0)) || say "the build leaves out of your environment: ${dropped[*]}"
+  IFS=: read -ra folders <<<"$PATH"
+  for folder in "${folders[@]}"; do
+    if [[ -x $folder/python3 && ! $folder =~ ^(/usr(/local)?)?/s?bin/?$ ]]; then
+      dropped+=("PATH=$folder")
+    else
+      kept+=("$folder")
+    fi
+  done
+  PATH="$(IFS=:; echo "${kept[*]}")"
 }
 
 # clean_libraries: drops folders of LD_LIBRARY_PATH with another Fast DDS, Fast CDR or Simbody, which would take the place of
@@ -251,6 +261,7 @@ build_tree() {
   { mkdir -p "$folder" && : >>"$folder/lock"; } 2>/dev/null ||
     fail "$folder: expected a folder of yours to build in, got one that user $(id -un) cannot write: copy the checkout"
   clean_build
+  ((${#dropped[@]} == 0)) || say "the build leaves out of your environment: ${dropped[*]}"
   exec {lock}>"$folder/lock"
   flock "$lock"  # Ninja's files do not survive two builds of one folder at once
   began=$SECONDS
@@ -278,6 +289,7 @@ build_tree() {
 # build_programs TARGET…: brings the targets up to date. The target `flight` is the programs of a flight: it needs
 # neither tools nor tests, unless the tree has them.
 build_programs() {
+  clean_build
   ! is_built "$build" "$@" || return 0
   if [[ $* == flight ]] && ! { has_tree "$build" && grep -qxF SLS_BUILD_TOOLS:BOOL=ON "$build/CMakeCache.txt"; }; then
     setup_flight
