@@ -202,6 +202,8 @@ class SecuredInteropTest : public InteropTest {
     InteropTest::SetUp();
     if (!IsSkipped() && !std::filesystem::exists(SLS_CYCLONE_PLUGINS "/libdds_security_crypto.so"))
       GTEST_SKIP() << "expected Cyclone's security plugins in " SLS_CYCLONE_PLUGINS;
+    if (std::string(SLS_FASTDDS_RELEASE).rfind("2.11.", 0) == 0)
+      GTEST_SKIP() << "Fast DDS 2.11 and Cyclone DDS 0.10 end no handshake (docs/limits.md)";
   }
   void make_keys(const Words& flags) const {
     Process process(Words{SLS_SOURCE_DIR "/sls", "keys", keys_} + flags);

@@ -117,15 +117,22 @@ TEST(IntruderTest, EachIsNamedWithItsCauseAndDisturbsNothing) {
   // These are there during the flight.
   flags = make_flags("4");
   run.keys.add_usurper("usurper");
-  intrude("its permissions are not signed by our permissions authority", run.keys.as("usurper"));
+  // Fast DDS 2.11 already refuses to start with such permissions.
+  constexpr const char* kOwn = "Participant is not allowed with its own permissions file";
+  const auto usurper = run.start("control_client", flags, run.keys.as("usurper"));
+  EXPECT_TRUE(wait_until([&] {
+    return holds(server->output(), "its permissions are not signed by our permissions authority") ||
+           holds(usurper->output(), kOwn);
+  })) << server->output()
+      << usurper->output();
   intrude("it has no identity", {}, qos("lan"));
   const std::string stolen = folder / "stolen";
   const auto stealing = run.start("recorder", {"--out", stolen}, {}, qos("lan"));
   ASSERT_TRUE(wait_for_text(*server, "refused 'recorder'")) << server->output();
   const auto recorder = run.start_recorder(), client = run.start_client();
   run.expect_same_as_open(*server, *client, *recorder);
+  if (!holds(usurper->output(), kOwn)) expect_nothing_received(*usurper);
   expect_nothing_received(*intruders[2]);
-  expect_nothing_received(*intruders[3]);
   stealing->send(SIGTERM);
   EXPECT_EQ(stealing->wait(), 143) << stealing->output();
   EXPECT_FALSE(std::filesystem::exists(stolen + "/state.csv"));
