@@ -80,7 +80,8 @@ void CommandLine::add_print_flag(const std::string& name, const std::function<vo
     print();
     throw CLI::Success();
   };
-  app_->add_flag_callback(name, print_and_end, help);
+  // Before CLI11 misses required options: 2.6 would look for those first.
+  app_->add_flag_callback(name, print_and_end, help)->trigger_on_parse();
 }
 
 void CommandLine::footer(const std::string& text) { app_->footer(text); }
