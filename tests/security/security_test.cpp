@@ -118,11 +118,11 @@ TEST(IntruderTest, EachIsNamedWithItsCauseAndDisturbsNothing) {
   flags = make_flags("4");
   run.keys.add_usurper("usurper");
   // Fast DDS 2.11 already refuses to start with such permissions.
-  constexpr const char* kOwn = "Participant is not allowed with its own permissions file";
+  constexpr const char* kRefusal = "Participant is not allowed with its own permissions file";
   const auto usurper = run.start("control_client", flags, run.keys.as("usurper"));
   EXPECT_TRUE(wait_until([&] {
     return holds(server->output(), "its permissions are not signed by our permissions authority") ||
-           holds(usurper->output(), kOwn);
+           holds(usurper->output(), kRefusal);
   })) << server->output()
       << usurper->output();
   intrude("it has no identity", {}, qos("lan"));
@@ -131,7 +131,7 @@ TEST(IntruderTest, EachIsNamedWithItsCauseAndDisturbsNothing) {
   ASSERT_TRUE(wait_for_text(*server, "refused 'recorder'")) << server->output();
   const auto recorder = run.start_recorder(), client = run.start_client();
   run.expect_same_as_open(*server, *client, *recorder);
-  if (!holds(usurper->output(), kOwn)) expect_nothing_received(*usurper);
+  if (!holds(usurper->output(), kRefusal)) expect_nothing_received(*usurper);
   expect_nothing_received(*intruders[2]);
   stealing->send(SIGTERM);
   EXPECT_EQ(stealing->wait(), 143) << stealing->output();
