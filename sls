@@ -246,10 +246,11 @@ show_progress() {
 # configure PRESET [--fresh]: if the tree has another compiler than the preset, CMake would keep none of the preset's
 # values, and leave out a sanitizer. Then the tree is made anew.
 configure() {
-  local said status=0
-  said="$(cmake --preset "$@" "-DSLS_MADE_ON:STRING=$(describe_place)" 2>&1)" || status=$?
+  local said status=0 made_on
+  made_on="-DSLS_MADE_ON:STRING=$(describe_place)"
+  said="$(cmake --preset "$@" "$made_on" 2>&1)" || status=$?
   printf '%s\n' "$said"
-  [[ $said != *'require your cache to be deleted'* ]] || { cmake --preset "$1" --fresh "-DSLS_MADE_ON:STRING=$(describe_place)"; return; }
+  [[ $said != *'require your cache to be deleted'* ]] || { cmake --preset "$1" --fresh "$made_on"; return; }
   return "$status"
 }
 

@@ -99,9 +99,9 @@ void add_common_options(CLI::App& cli, CommonOptions& options) {
   cli.parse_complete_callback([domain] {
     const char* value = std::getenv(kDomainVariable);
     if (value && *value && domain->empty())
-      throw CLI::ValidationError("--domain", std::string(kDomainVariable) + ": expected 0 to " +
-                                                 std::to_string(config::kMaxDomain) + ", got '" +
-                                                 value + "'");
+      throw CLI::ValidationError(
+          kDomainVariable,
+          "expected 0 to " + std::to_string(config::kMaxDomain) + ", got '" + value + "'");
   });
   cli.add_option("--log-level", options.log_level, "least severe message shown on stderr")
       ->type_name("LEVEL")

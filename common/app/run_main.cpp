@@ -88,7 +88,6 @@ std::string describe_usage_error(const CLI::ParseError& error, const CLI::App& c
   const bool is_given = std::any_of(words.begin(), words.end(), [](const std::string& word) {
     return word.rfind("--domain", 0) == 0;
   });
-  if (text.rfind(domain + "SLS_DOMAIN: ", 0) == 0) return text.substr(domain.size());
   if (!is_given && text.rfind(domain + "expected", 0) == 0)
     return "SLS_DOMAIN: " + text.substr(domain.size());
   return text;

@@ -12,9 +12,9 @@ namespace sls::bus {
 
 /// The plain announcement of a participant.
 ///
-/// Fast DDS 2.10.3, 2.11.3, 2.12.2, 2.13 and later, 3 among them, discovers a secured participant only through a second
-/// announcement, sent by a secure writer after the authentication (PDPSimple::assignRemoteEndpoints
-/// of 3.1.2). So it does not tell the name of one that it refuses. Earlier versions announce that
+/// Fast DDS 2.10.3, 2.11.3, 2.12.2, 2.13 and later, 3 among them, discovers a secured participant
+/// only through a second announcement, sent by a secure writer after the authentication
+/// (PDPSimple::assignRemoteEndpoints of 3.1.2). So it does not tell the name of one that it refuses. Earlier versions announce that
 /// writer (PDP.cpp of 2.9.1, line 255), but do not have it: a secured flight needs one version.
 /// Cyclone DDS 0.10 has it, but writes nothing with it (README.md, trap 38).
 ///
