@@ -32,7 +32,7 @@ int main(int argc, char** argv) {
 
   return app::run_main(argc, argv, cli, options, "closed_loop", [&] {
     config::Scenario scenario = config::load_scenario(scenario_file);
-    if (!scenario.warning.empty()) app::log({true, scenario.warning});
+    for (const std::string& warning : scenario.warnings) app::log({true, warning});
     if (period_s) config::override_period(scenario, *period_s);
     scenario.sync.mode = config::SyncMode::kLockstep;  // no answer can be late here
     const auto began = std::chrono::steady_clock::now();

@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
 
   const int code = app::run_main(argc, argv, cli, options, "sim_server", [&] {
     config::Scenario scenario = config::load_scenario(scenario_file);
-    if (!scenario.warning.empty()) app::log({true, scenario.warning});
+    for (const std::string& warning : scenario.warnings) app::log({true, warning});
     if (period_s) config::override_period(scenario, *period_s);
     if (!mode.empty())
       scenario.sync.mode =

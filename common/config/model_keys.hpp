@@ -42,6 +42,10 @@ class ModelKeys {
   virtual void describe(MapWriter& map, Section& section) const = 0;
   /// Rules between these keys and others of the scenario. @throws ConfigError.
   virtual void check(const Scenario&, const Places&) const {}
+  /// What the keys allow but hardly mean. Called after `check`.
+  virtual std::optional<ConfigError> find_warning(const Scenario&, const Places&) const {
+    return {};
+  }
   /// True for a plant whose vehicles have an attitude. The scenario may then have an initial
   /// attitude and attitude errors (`estimator`); a plant of the project also accepts an
   /// `autopilot`.

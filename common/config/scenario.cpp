@@ -261,7 +261,7 @@ void check_step(Scenario& scenario, const Places& places) {
                           to_text(std::round(rate * 10.0) / 10.0) + " rad/s, got " + to_text(step) +
                           (is_refused ? "" : ": the swing loses energy"));
   if (is_refused) throw error;
-  scenario.warning = error.what();
+  scenario.warnings.push_back(error.what());
 }
 
 /// Conditions on cable and load need a plant that has cables, and those on the ground a ground.
@@ -359,7 +359,10 @@ Scenario read_scenario(const YamlNode& root, const std::string& place, const std
   check_step(scenario, places);
   check_attitudes(scenario, places);
   check_conditions(scenario, places);
-  find_model_keys(places.models().laws, scenario.controller.law).check(scenario, places);
+  const auto& law = find_model_keys(places.models().laws, scenario.controller.law);
+  law.check(scenario, places);
+  if (const auto warning = law.find_warning(scenario, places))
+    scenario.warnings.push_back(warning->what());
   scenario.text = text;
   scenario.sha256 = text::calc_sha256(text);
   return scenario;

@@ -398,7 +398,7 @@ struct Scenario {
   std::string text;              ///< the file's bytes
   std::filesystem::path folder;  ///< of the file: paths in it are relative to that
   std::string sha256;            ///< of those bytes, 64 lower-case hex digits
-  std::string warning;           ///< of a coarse step, as FILE:LINE: …; empty: none
+  std::vector<std::string> warnings;  ///< of what is allowed but hardly meant, as FILE:LINE: …
 };
 
 struct Models;  // model_keys.hpp

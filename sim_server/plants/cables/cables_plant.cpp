@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <stdexcept>
 #include <utility>
 
 #include "common/config/numbers.hpp"
@@ -12,7 +13,7 @@
 namespace sls::sim {
 namespace {
 
-constexpr int kMostRemarks = 20;  // of a vehicle
+constexpr int kMostRemarks = 20;  // of a vehicle on a topic
 constexpr const char* kNoneCarries = "; no cable carries the load";
 constexpr double kSameTime = 1e-12;  // s: rounding of a time in a scenario
 
@@ -41,7 +42,8 @@ CablesPlant::CablesPlant(const PlantSetup& setup, const cables::Start& start)
       motion_(start.system, start.motion),
       phases_(setup.vehicles.size()),
       remarks_(setup.vehicles.size()),
-      remark_counts_(setup.vehicles.size()) {
+      remark_counts_(setup.vehicles.size()),
+      named_step_ns_(setup.plant.step_ns) {
   actions_.air = setup.plant.air;
   actions_.disturbance_W = setup.plant.disturbance_W;
   if (const auto& airframe = setup.plant.own.get<CablesKeys>().airframe) {
@@ -127,7 +129,30 @@ void CablesPlant::fly_step() {
     }
     flown = until;
   }
+  if (motion_.energy_error() > cables::HybridMotion::kCoarse) judge_step();
   if (rotors_) rotors_->end_step(motion_);
+}
+
+/// Names a step that is too coarse: once, and again when only half of the named step would do.
+void CablesPlant::judge_step() {
+  constexpr double kAimed = 0.25 * cables::HybridMotion::kCoarse;
+  const double error = motion_.energy_error();
+  const std::int64_t step_ns = std::llround(1e9 * step_s_);
+  std::int64_t fine_ns = step_ns;
+  for (double left = error; left > kAimed && 1024 * fine_ns > step_ns; left /= 16.0) fine_ns /= 2;
+  const auto show = [](std::int64_t ns) {
+    return config::to_text(static_cast<double>(ns) / 1e9) + " s";
+  };
+  const std::string when = describe_time(static_cast<double>(steps_ + 1) * step_s_);
+  if (error > cables::HybridMotion::kWrong)
+    throw std::runtime_error("plant.step_s: expected at most " + show(fine_ns) +
+                             " for the motion at " + when + ", got " + show(step_ns) +
+                             ", with which the flight is wrong");
+  if (fine_ns >= named_step_ns_) return;
+  named_step_ns_ = fine_ns;
+  remark(0, Topic::kStep,
+         "plant.step_s of " + show(step_ns) + " too coarse for the motion at " + when + "; " +
+             show(fine_ns) + " would do");
 }
 
 void CablesPlant::apply(const Change& change) {
@@ -138,8 +163,9 @@ void CablesPlant::apply(const Change& change) {
     motion_.cut(change.cable);
   }
   if (!change.remark.empty())
-    remark(change.cable, change.remark + " at " + describe_time(change.time) +
-                             (!change.phase && motion_.taut().empty() ? kNoneCarries : ""));
+    remark(change.cable, Topic::kPlan,
+           change.remark + " at " + describe_time(change.time) +
+               (!change.phase && motion_.taut().empty() ? kNoneCarries : ""));
 }
 
 model::Measurement CablesPlant::measure(std::size_t vehicle) const {
@@ -170,8 +196,8 @@ model::Measurement CablesPlant::measure(std::size_t vehicle) const {
   Eigen::Index count = 0;
   const auto add = [&](double number) { measured.signals[count++] = number; };
   measured.signals.resize(static_cast<Eigen::Index>(signals_.size()));
-  for (const double number : {tension, own.length, is_taut ? 1.0 : 0.0, q[0], q[1], q[2], q[3],
-                              motion.w_WL_L.x(), motion.w_WL_L.y(), motion.w_WL_L.z()})
+  for (const double number : {std::max(tension, 0.0), own.length, is_taut ? 1.0 : 0.0, q[0], q[1],
+                              q[2], q[3], motion.w_WL_L.x(), motion.w_WL_L.y(), motion.w_WL_L.z()})
     add(number);
   if (has_winch_) add(own.length_rate);
   if (has_release_) add(motion_.is_cut(vehicle));
@@ -215,29 +241,34 @@ void CablesPlant::note(const cables::Event& event) {
       " at " + describe_time(static_cast<double>(steps_) * step_s_ + event.time);
   switch (event.kind) {
     case Kind::kStuck:
-      return remark(vehicle, "cable: too many events in one step" + time +
-                                 "; taut cables stay taut until its end");
+      return remark(
+          vehicle, Topic::kEvents,
+          "cable: too many events in one step" + time + "; taut cables stay taut until its end");
     case Kind::kSlack:
-      return remark(vehicle, "cable slack" + time + (motion_.taut().empty() ? kNoneCarries : ""));
+      return remark(vehicle, Topic::kCable,
+                    "cable slack" + time + (motion_.taut().empty() ? kNoneCarries : ""));
     case Kind::kTouchDown:
-      return remark(vehicle, body + " on the ground" + time);
+      return remark(vehicle, Topic::kGround, body + " on the ground" + time);
     case Kind::kLiftOff:
-      return remark(vehicle, body + " lifts off" + time);
+      return remark(vehicle, Topic::kGround, body + " lifts off" + time);
     case Kind::kTaut: {
       char impulse[32];
       const auto end = std::to_chars(impulse, impulse + sizeof impulse, event.impulse,
                                      std::chars_format::general, 6);
-      return remark(vehicle,
+      return remark(vehicle, Topic::kCable,
                     "cable taut" + time + ", impulse " + std::string(impulse, end.ptr) + " N s");
     }
   }
 }
 
-void CablesPlant::remark(std::size_t vehicle, const std::string& text) {
-  int& count = remark_counts_[vehicle];
+void CablesPlant::remark(std::size_t vehicle, Topic topic, const std::string& text) {
+  constexpr const char* kNames[kTopics] = {"plan", "cable", "ground", "too many events", "step_s"};
+  const auto index = static_cast<std::size_t>(topic);
+  int& count = remark_counts_[vehicle][index];
   if (++count > kMostRemarks) return;
   remarks_[vehicle].push_back(text);
-  if (count == kMostRemarks) remarks_[vehicle].push_back("cable: no further remark on it");
+  if (count == kMostRemarks)
+    remarks_[vehicle].push_back(std::string(kNames[index]) + ": no further remark on it");
 }
 
 std::vector<std::string> CablesPlant::take_remarks(std::size_t vehicle) {

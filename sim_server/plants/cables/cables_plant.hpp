@@ -1,6 +1,7 @@
 /// The plant: vehicles, one load, and cables that go slack and taut. README.md.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -49,7 +50,11 @@ class CablesPlant : public Plant {
   void apply(const Change& change);
   model::Measurement measure(std::size_t vehicle) const;
   void note(const cables::Event& event);
-  void remark(std::size_t vehicle, const std::string& text);
+  void judge_step();
+  /// What a remark is about. Each has its own quota, so that bounces do not use up that of others.
+  enum class Topic { kPlan, kCable, kGround, kEvents, kStep };
+  static constexpr std::size_t kTopics = 5;
+  void remark(std::size_t vehicle, Topic topic, const std::string& text);
 
   const cables::System system_;
   const double step_s_;
@@ -65,7 +70,8 @@ class CablesPlant : public Plant {
   std::vector<cables::Event> events_;  // of one step; a member to avoid allocation
   std::vector<model::Measurement> measurements_;
   std::vector<std::vector<std::string>> remarks_;
-  std::vector<int> remark_counts_;  // made so far, of each vehicle
+  std::vector<std::array<int, kTopics>> remark_counts_;  // made so far, of each vehicle
+  std::int64_t named_step_ns_;  // the finest that a remark has named, or the own
 };
 
 }  // namespace sls::sim

@@ -14,6 +14,7 @@ constexpr double kSimultaneous = 1e-10;   // s: cables that arrive within it mee
 constexpr double kTouching = 1e-12;       // m, and m/s per 1 + speed: rounding of 0
 constexpr double kRounding = 1e-13;       // of a tension relative to all forces
 constexpr int kMostEvents = 64;           // in a step
+constexpr double kDrift = 1e-11;          // m: of a cable in a step, before eq. (8)
 
 /// The end of an interval of at most kTimeTolerance in which `value` becomes positive: between
 /// `low`, where it is not, and `high`, where it is. Regula falsi (Illinois), every third time
@@ -120,6 +121,17 @@ Members find_bodies(const System& system) {
   return bodies;
 }
 
+/// The energy that lifts the lightest body by the longest cable, J. Where things hardly weigh
+/// anything, as if g were 1 m/s².
+double calc_energy_scale(const System& system, const Motion& motion) {
+  double mass = system.load_mass, length = 0.0;
+  for (std::size_t i = 0; i < system.count; ++i) {
+    mass = std::min(mass, system.vehicle_mass[i]);
+    length = std::max(length, motion.vehicles[i].length);
+  }
+  return mass * std::max(system.gravity, 1.0) * length;
+}
+
 }  // namespace
 
 struct HybridMotion::Found {
@@ -131,7 +143,8 @@ HybridMotion::HybridMotion(const System& system, const Motion& start)
     : system_(system),
       held_(system),
       uncut_(Members::all(system.count)),
-      bodies_(find_bodies(system)) {
+      bodies_(find_bodies(system)),
+      inverse_energy_scale_(1.0 / calc_energy_scale(system, start)) {
   now().tension.fill(0.0);
   now().ground.fill(0.0);
   stage_.ground.fill(0.0);
@@ -188,11 +201,16 @@ void HybridMotion::put_on_ground(const Members& bodies) {
   set_standing(unite(mode_.standing, bodies));
 }
 
-/// The cables at their length whose ends do not approach.
+/// The cables at their length whose ends neither approach nor move apart: where those of a slack one
+/// do, it arrives, and an impact follows.
 Members HybridMotion::find_touching(const Instant& instant) const {
   const double speed = instant.motion.v_WL.lpNorm<1>(), place = instant.motion.p_WL.lpNorm<1>();
-  Members touching = find_candidates(uncut_, instant.geometry, kTouching * (1.0 + place),
-                                     kTouching * (1.0 + speed));
+  const double least = -kTouching * (1.0 + place), rounding = kTouching * (1.0 + speed);
+  const Geometry& geometry = instant.geometry;
+  Members touching;
+  for (const std::size_t i : uncut_)
+    if (geometry.stretch[i] >= least && std::abs(geometry.stretch_rate[i]) <= rounding)
+      touching.add(i);
   return find_moving(touching, mode_.standing);
 }
 
@@ -232,8 +250,9 @@ void HybridMotion::support(const Actions& actions, Instant& instant) const {
   }
 }
 
-/// Brings the `cables` to their length, eq. (8), and computes their geometry and factor.
-void HybridMotion::place(const Members& cables, Instant& instant) const {
+/// Brings the `cables` to their length, eq. (8), and computes their geometry and factor. Returns
+/// how far one was from it, m.
+double HybridMotion::place(const Members& cables, Instant& instant) const {
   Motion& motion = instant.motion;
   Geometry& geometry = instant.geometry;
   if (system_.is_rigid && !mode_.standing.has(kLoad))
@@ -245,13 +264,15 @@ void HybridMotion::place(const Members& cables, Instant& instant) const {
     }
   // Newton's method; the error of a step, of order h⁵, needs one correction.
   constexpr int kMostCorrections = 4;
+  double first_error = 0.0;
   for (int corrections = 0;; ++corrections) {
     calc_geometry(held_, motion, uncut_, geometry);
     hold(cables, instant);
     double error = 0.0;
     for (const std::size_t i : cables) error = std::max(error, std::abs(geometry.stretch[i]));
     const double rounding = 2e-16 * (1.0 + motion.p_WL.lpNorm<1>());
-    if (!(error > rounding) || corrections == kMostCorrections) return;
+    if (corrections == 0) first_error = error;
+    if (!(error > rounding) || corrections == kMostCorrections) return first_error;
     Vector shift;
     instant.factor.solve(geometry.stretch, shift);
     add_shifts(held_, geometry, shift, cables, motion);
@@ -259,12 +280,13 @@ void HybridMotion::place(const Members& cables, Instant& instant) const {
 }
 
 /// Also removes the velocities by which the `cables` would lengthen or shorten: eq. (9).
-void HybridMotion::settle(const Members& cables, Instant& instant) const {
-  place(cables, instant);
+double HybridMotion::settle(const Members& cables, Instant& instant) const {
+  const double error = place(cables, instant);
   Vector impulses;
   instant.factor.solve(instant.geometry.stretch_rate, impulses);
   add_pulls(held_, instant.geometry, impulses, cables, instant.motion);
   for (const std::size_t i : cables) instant.geometry.stretch_rate[i] = 0.0;
+  return error;
 }
 
 void HybridMotion::hold(const Members& cables, Instant& instant) const {
@@ -373,6 +395,11 @@ void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
   if (actions.propulsion)
     actions.propulsion->turn(now().rotors, h, stage.rotors, ending_, end.rotors);
   Motion sum;
+  double power = 0.0;  // six times the mean of what the forces give
+  const auto add_power = [&](double weight, const Instant& at) {
+    if (does_work_vary_) power += weight * calc_power(system_, at.motion, at.rate);
+  };
+  add_power(1.0, now());
   const auto calc_stage = [&](double share, const Motion& rate) {
     add(system_, now().motion, share * h, rate, stage.motion);
     calc_geometry(held_, stage.motion, mode_.taut, stage.geometry);
@@ -380,17 +407,31 @@ void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
     pull(actions, stage);
   };
   calc_stage(0.5, now().rate);
+  add_power(2.0, stage);
   add(system_, now().rate, 2.0, stage.rate, sum);
   calc_stage(0.5, stage.rate);
+  add_power(2.0, stage);
   add(system_, sum, 2.0, stage.rate, sum);
   between_.tension = stage.tension;
   if (!mode_.standing.empty()) between_.ground = stage.ground;
   stage.rotors.swap(ending_);
   calc_stage(1.0, stage.rate);
   add(system_, sum, 1.0, stage.rate, sum);
+  add_power(1.0, stage);
+  work_ = h / 6.0 * power;
   add(system_, now().motion, h / 6.0, sum, end.motion);
-  settle(mode_.taut, end);
+  drift_ = settle(mode_.taut, end);
   pull(actions, end);
+}
+
+/// Compares the change of energy in the part of a step last integrated with the work: eq. (18).
+/// Held forces and cables that kept their length give no error worth its cost.
+void HybridMotion::note_energy_error(const Actions& actions) {
+  if (!does_work_vary_ && !(drift_ > kDrift)) return;
+  const Motion &start = now().motion, &end = then().motion;
+  const double gained = does_work_vary_ ? calc_kinetic_change(system_, start, end) - work_
+                                        : calc_energy_gain(system_, actions, start, end);
+  energy_error_ += std::abs(gained) * inverse_energy_scale_;
 }
 
 /// How far a limit that holds is lost, N: by a negative tension, or a lift.
@@ -601,10 +642,17 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
     choose(actions, candidates);
     report(before, 0.0, events);
   }
+  energy_error_ *= std::max(0.0, 1.0 - h);
+  const auto winds = [&](std::size_t i) {
+    return actions.length_acceleration[i] != 0.0 || now().motion.vehicles[i].length_rate != 0.0;
+  };
+  does_work_vary_ = actions.propulsion || actions.air.rotor_drag != 0.0 ||
+                    std::any_of(uncut_.begin(), uncut_.end(), winds);
   double time = 0.0;
   for (int count = 1;; ++count) {
     is_later_ = count > 1;
     const Found found = find_first(actions, h - time);
+    note_energy_error(actions);
     now_at_ = 1 - now_at_;
     if (found.limit.of == Limit::Of::kNothing) break;
     time += found.time;
@@ -616,7 +664,12 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
       is_stuck_ = true;
       events.push_back({Event::Kind::kStuck, found.limit.index, time, 0.0});
     }
-    if (time >= h) return;
+    if (time >= h) break;
+  }
+  if (is_stuck_ && std::any_of(taut.begin(), taut.end(), pushes)) {
+    const Mode before = mode_;
+    choose(actions, unite(find_touching(now()), taut));
+    report(before, h, events);
   }
   check_held();
 }

@@ -51,8 +51,14 @@ class HybridMotion {
   const Members& standing() const { return mode_.standing; }
   /// Of the last step's actions, N; 0 of a slack cable and before the first step.
   const Vector& tension() const { return now().tension; }
+  /// What the method itself gained or lost of the energy in about the last second, per energy that
+  /// lifts the lightest body by the longest cable: README.md, eq. (18).
+  double energy_error() const { return energy_error_; }
 
   static constexpr double kLengthTolerance = 1e-9;  ///< m
+  /// Energy errors: above the first a flight may be wrong by 1 % of a cable, above the second it is
+  /// wrong.
+  static constexpr double kCoarse = 1e-5, kWrong = 1.0;
 
  private:
   using OfBodies = std::array<double, kMaxCables + 1>;
@@ -100,8 +106,8 @@ class HybridMotion {
   const Actions& act(const Actions& actions, const Instant& instant) const;
   void pull(const Actions& actions, Instant& instant) const;
   void support(const Actions& actions, Instant& instant) const;
-  void place(const Members& cables, Instant& instant) const;
-  void settle(const Members& cables, Instant& instant) const;
+  double place(const Members& cables, Instant& instant) const;
+  double settle(const Members& cables, Instant& instant) const;
   void hold(const Members& cables, Instant& instant) const;
   double calc_lift(const Actions& actions, const Instant& instant, std::size_t body) const;
   void keep(const Actions& actions, const Members& cables);
@@ -109,6 +115,7 @@ class HybridMotion {
   void choose(const Actions& actions, const Members& candidates);
   Vector hit(const Members& meeting);
   void integrate(const Actions& actions, double h, Instant& end);
+  void note_energy_error(const Actions& actions);
   double calc_loss(const Actions& actions, const Instant& instant, const Limit& limit) const;
   std::optional<double> find_loss(const Actions& actions, double h, const Holding& middle,
                                   const Instant& end, const Limit& limit);
@@ -121,18 +128,23 @@ class HybridMotion {
   void report(const Mode& before, double time, std::vector<Event>& events) const;
 
   const System system_;
-  System held_;           // with the standing bodies infinitely heavy
-  Members uncut_;         // cables
-  const Members bodies_;  // that the ground stops; none without ground
+  System held_;                        // with the standing bodies infinitely heavy
+  Members uncut_;                      // cables
+  const Members bodies_;               // that the ground stops; none without ground
+  const double inverse_energy_scale_;  // 1/J
+  double energy_error_ = 0.0;
   Mode mode_;
   std::array<Instant, 2> ends_;  // large: exchanged by their place
   std::size_t now_at_ = 0;
   Instant trial_, stage_;
-  RotorSpeeds ending_;        // for the last stage of a step
-  mutable Actions acting_;    // of the rotors at one instant; a member because it is large
-  Holding between_;           // in the middle of the step last integrated
-  double force_scale_ = 0.0;  // of all forces, N
-  bool is_later_ = false;     // not the first event of a step
+  RotorSpeeds ending_;           // for the last stage of a step
+  mutable Actions acting_;       // of the rotors at one instant; a member because it is large
+  Holding between_;              // in the middle of the step last integrated
+  bool does_work_vary_ = false;  // between the stages of a step: a force that is held gives f · Δx
+  double drift_ = 0.0;           // of a cable in the part of a step last integrated, m
+  double work_ = 0.0;            // if so, in the part of a step last integrated, J
+  double force_scale_ = 0.0;     // of all forces, N
+  bool is_later_ = false;        // not the first event of a step
   bool is_stuck_ = false;
 };
 

@@ -172,6 +172,46 @@ void calc_offset(const System& system, const Motion& motion, const Geometry& geo
   }
 }
 
+double calc_power(const System& system, const Motion& motion, const Motion& rate) {
+  double power = system.load_mass * model::dot(motion.v_WL, rate.v_WL);
+  if (system.is_rigid) power += model::dot(motion.w_WL_L, Vector3d(system.inertia_L * rate.w_WL_L));
+  for (std::size_t i = 0; i < system.count; ++i)
+    power += system.vehicle_mass[i] * model::dot(motion.vehicles[i].v_W, rate.vehicles[i].v_W);
+  return power;
+}
+
+double calc_kinetic_change(const System& system, const Motion& from, const Motion& to) {
+  const auto half_square_change = [](const Vector3d& v, const Vector3d& v_end) {
+    return 0.5 * model::dot(Vector3d(v_end - v), Vector3d(v_end + v));
+  };
+  double change = system.load_mass * half_square_change(from.v_WL, to.v_WL);
+  if (system.is_rigid)
+    change += 0.5 * model::dot(Vector3d(to.w_WL_L - from.w_WL_L),
+                               Vector3d(system.inertia_L * (to.w_WL_L + from.w_WL_L)));
+  for (std::size_t i = 0; i < system.count; ++i)
+    change += system.vehicle_mass[i] * half_square_change(from.vehicles[i].v_W, to.vehicles[i].v_W);
+  return change;
+}
+
+double calc_energy_gain(const System& system, const Actions& actions, const Motion& from,
+                        const Motion& to) {
+  const Vector3d v = to.v_WL + from.v_WL;
+  double gain = system.load_mass * (0.5 * model::dot(Vector3d(to.v_WL - from.v_WL), v) -
+                                    system.gravity * (to.p_WL.z() - from.p_WL.z()));
+  if (system.is_rigid)
+    gain += 0.5 * model::dot(Vector3d(to.w_WL_L - from.w_WL_L),
+                             Vector3d(system.inertia_L * (to.w_WL_L + from.w_WL_L)));
+  for (std::size_t i = 0; i < system.count; ++i) {
+    const Vehicle &at = from.vehicles[i], &then = to.vehicles[i];
+    const Vector3d way = then.p_W - at.p_W;
+    gain += system.vehicle_mass[i] *
+                (0.5 * model::dot(Vector3d(then.v_W - at.v_W), Vector3d(then.v_W + at.v_W)) -
+                 system.gravity * way.z()) -
+            model::dot(Vector3d(actions.f_Q_W[i] + actions.disturbance_W), way);
+  }
+  return gain;
+}
+
 void add_pulls(const System& system, const Geometry& geometry, const Vector& pulls,
                const Members& cables, Motion& rate) {
   Vector3d on_load = Vector3d::Zero();

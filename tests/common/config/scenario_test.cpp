@@ -37,12 +37,19 @@ TEST(ScenarioTest, ReadsTheExampleOfTheDesign) {
   EXPECT_EQ(scenario.text, kDesignExample);
 }
 
-TEST(ScenarioTest, WarnsOfAStepThatDampsTheSwing) {
+TEST(ScenarioTest, WarnsOfWhatIsAllowedButHardlyMeant) {
   std::string text = replace_once(kDesignExample, "rod_length_m: 1.0", "rod_length_m: 0.01");
   text = replace_once(text, "step_s: 0.001", "step_s: 0.01");
-  EXPECT_EQ(parse_scenario(replace_once(text, "period_s: 0.004", "period_s: 0.02"), "file").warning,
-            "file:5: plant.step_s: expected at most 0.007501 for a swing of 33.3 rad/s, got 0.01: "
-            "the swing loses energy");
+  text = replace_once(text, "period_s: 0.004", "period_s: 0.02");
+  EXPECT_EQ(parse_scenario(text, "file").warnings,
+            (std::vector<std::string>{"file:5: plant.step_s: expected at most 0.007501 for a swing "
+                                      "of 33.3 rad/s, got 0.01: the swing loses energy"}));
+  text = read_file("config/scenarios/lift_and_set_down.yaml");
+  text = replace_once(text, "retaut_rate_m_s: 2", "retaut_rate_m_s: 0.5");
+  EXPECT_EQ(parse_scenario(text, "file").warnings,
+            (std::vector<std::string>{
+                "file:15: controller.retaut_rate_m_s: expected at least 2, got 0.5: a load that "
+                "falls by its whole cable is caught 20.1 m lower"}));
 }
 
 /// The scenario of `kEveryKey`.

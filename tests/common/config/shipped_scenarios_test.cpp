@@ -27,7 +27,7 @@ TEST(ShippedScenariosTest, ShareTimingAndBearTheirFilesName) {
     EXPECT_EQ(scenario.sync.mode, SyncMode::kLockstep);
     EXPECT_EQ(scenario.sync.period_ns, at_50_hz.count(scenario.name) ? 20'000'000 : 4'000'000);
     EXPECT_EQ(scenario.plant.step_ns, 1'000'000);
-    EXPECT_EQ(scenario.warning, "");
+    EXPECT_EQ(scenario.warnings, std::vector<std::string>());
     EXPECT_EQ(scenario.sync.wait_for.controllers, 1);
     EXPECT_EQ(scenario.sync.wait_for.recorders, 1);
     EXPECT_EQ(scenario.sync.wait_for.timeout_s, 30.0);

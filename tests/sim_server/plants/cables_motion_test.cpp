@@ -289,6 +289,21 @@ TEST(CablesMotionTest, ABouncingLoadComesToRestInFiniteTimeWithItsCableTaut) {
   EXPECT_NEAR(end.v_WL.z(), 9.8 * 0.25 * time, 1e-11);
 }
 
+TEST(CablesMotionTest, ACableThatArrivesAtTheEndOfAStepRebounds) {
+  // The relative motion falls with 9.8 m/s² and arrives at 0.1 s, the end of step 100, but for
+  // rounding.
+  System system = make_system();
+  system.restitution = 0.5;
+  Motion start = make_motion();
+  start.vehicles[0].p_W = {0.0, 0.0, -(1.0 - 0.5 * 9.8 * 0.01)};
+  Flight flight(system, start);
+  flight.fly(make_actions({0.0, 0.0, -1.5 * 9.8}), 0.102);
+  ASSERT_FALSE(flight.happened.empty());
+  EXPECT_NEAR(flight.happened[0].time, 0.1, 1e-11);
+  const Motion& end = flight.motion.motion();
+  EXPECT_NEAR(end.v_WL.z() - end.vehicles[0].v_W.z(), -0.5 * 0.98 + 0.002 * 9.8, 1e-11);
+}
+
 TEST(CablesMotionTest, RandomFlightsLoseNoTimeAndNeverStretchACable) {
   // The centre of mass moves as if there were no cables: each lost part of a step would show.
   std::mt19937 random(5);

@@ -98,19 +98,22 @@ TEST(CablesPlantTest, SharesHangOnTheirCablesAndADropIsReported) {
   EXPECT_TRUE(plant->take_remarks(1).empty());
 }
 
-TEST(CablesPlantTest, SaysWhenNoCableCarriesTheLoadAndLimitsItsRemarks) {
+TEST(CablesPlantTest, SaysWhenNoCableCarriesTheLoadAndLimitsItsRemarksOnEachTopic) {
   config::Scenario scenario;
   scenario.plant.model.name = "cables";
+  scenario.plant.own.edit<CablesKeys>().cables.resize(1);
+  scenario.plant.own.edit<CablesKeys>().cables[0].release_ns = 3'900'000'000;
   const auto plant = make(scenario);
   std::vector<std::string> remarks;
   for (int k = 0; k < 400; ++k) {  // pushes and pulls in turn
     plant->advance({Vector3d(0.0, 0.0, k % 2 == 0 ? 5.0 : -40.0)}, 10);
     for (const std::string& remark : plant->take_remarks(0)) remarks.push_back(remark);
   }
-  ASSERT_EQ(remarks.size(), 21u);
+  ASSERT_EQ(remarks.size(), 22u);
   EXPECT_EQ(remarks[0], "cable slack at 0.000000000 s; no cable carries the load");
   EXPECT_EQ(remarks[1].rfind("cable taut at 0.01", 0), 0u) << remarks[1];
   EXPECT_EQ(remarks[20], "cable: no further remark on it");
+  EXPECT_EQ(remarks[21], "cable released at 3.900000000 s; no cable carries the load");
 }
 
 TEST(CablesPlantTest, AdvancesInAnyNumberOfCallsWithTheSameBitsThroughEvents) {
