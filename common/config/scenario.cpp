@@ -113,8 +113,12 @@ void check_autopilot(const Scenario& scenario, const Places& places) {
       if (key.empty() && !keys->has_attitude(Plant())) continue;
       takers += (takers.empty() ? "'" : " or '") + name + "'" + (key.empty() ? "" : " with " + key);
     }
-    for (const char* key :
-         {"autopilot", "plant.initial.attitude", "plant.initial.body_rates_rad_s"})
+    std::vector<std::string> keys = {"autopilot", "plant.initial.attitude",
+                                     "plant.initial.body_rates_rad_s"};
+    for (std::size_t i = 0; i < scenario.vehicles.size(); ++i)
+      for (const char* key : {"attitude", "body_rates_rad_s"})
+        keys.push_back("vehicles[" + std::to_string(i) + "]." + key);
+    for (const std::string& key : keys)
       if (places.has(key))
         throw places.make_error_at(key, "of plant.model " + takers + " alone, here it is '" +
                                             scenario.plant.model.name + "'");
@@ -264,6 +268,44 @@ void check_step(Scenario& scenario, const Places& places) {
   scenario.warnings.push_back(error.what());
 }
 
+/// Turbulence does not change where it stands still: the mean wind carries it.
+void check_wind(const Scenario& scenario, const Places& places) {
+  const Eigen::Vector3d& mean = scenario.plant.air.v_wind_W;
+  if (scenario.plant.wind.turbulence && mean.head<2>().isZero(0.0))
+    throw places.make_error_at("plant.wind.turbulence",
+                               "expected a level plant.wind_m_s, which carries it, got none");
+}
+
+/// Failures are of vehicles and rotors that are there, and a battery can give the power to hover.
+void check_thrust(const Scenario& scenario, std::size_t rotors, const Places& places) {
+  const Thrust& thrust = scenario.plant.thrust;
+  for (std::size_t i = 0; i < thrust.failures.size(); ++i) {
+    const ThrustFailure& failure = thrust.failures[i];
+    const std::string path = "plant.thrust.failures[" + std::to_string(i) + "].";
+    const auto count = static_cast<int>(scenario.vehicles.size());
+    if (failure.vehicle >= count)
+      throw places.make_error_at(path + "vehicle", "expected < the number of vehicles (" +
+                                                       std::to_string(count) + "), got " +
+                                                       std::to_string(failure.vehicle));
+    if (failure.rotor && *failure.rotor > static_cast<int>(rotors))
+      throw places.make_error_at(
+          path + "rotor", "expected a rotor from 1 to " + std::to_string(rotors) +
+                              " (a point mass has none), got " + std::to_string(*failure.rotor));
+  }
+  if (!thrust.battery) return;
+  const Battery& battery = *thrust.battery;
+  if (battery.empty_v > battery.full_v)
+    throw places.make_error_at("plant.thrust.battery.empty_v",
+                               "expected at most full_v (" + to_text(battery.full_v) + "), got " +
+                                   to_text(battery.empty_v));
+  const double most = battery.empty_v * battery.empty_v / (4.0 * battery.hover_power_w);
+  if (battery.resistance_ohm > most)
+    throw places.make_error_at("plant.thrust.battery.resistance_ohm",
+                               "expected at most " + to_text(most) +
+                                   ", with which empty_v still gives hover_power_w, got " +
+                                   to_text(battery.resistance_ohm));
+}
+
 /// Conditions on cable and load need a plant that has cables, and those on the ground a ground.
 void check_conditions(const Scenario& scenario, const Places& places) {
   const auto& load = scenario.shared_load;
@@ -357,6 +399,8 @@ Scenario read_scenario(const YamlNode& root, const std::string& place, const std
   plant.check(scenario, places);
   scenario.shared_load = plant.calc_shared_load(scenario);
   check_step(scenario, places);
+  check_wind(scenario, places);
+  check_thrust(scenario, plant.calc_shape(scenario.plant).rotors.size(), places);
   check_attitudes(scenario, places);
   check_conditions(scenario, places);
   const auto& law = find_model_keys(places.models().laws, scenario.controller.law);
@@ -401,6 +445,12 @@ Scenario make_vehicle_scenario(const Scenario& scenario, std::uint32_t id) {
   Scenario alone = scenario;
   alone.vehicles.assign(1, VehicleVariant{});
   put_own(variant, alone.vehicle);
+  InitialState& initial = alone.plant.initial;
+  initial.has_own_velocity = variant.v_WQ.has_value();
+  initial.v_WQ = variant.v_WQ.value_or(initial.v_WQ);
+  alone.plant.thrust.scale = variant.thrust_scale.value_or(alone.plant.thrust.scale);
+  if (variant.q_WB) initial.q_WB = variant.q_WB;
+  if (variant.w_WB_B) initial.w_WB_B = variant.w_WB_B;
   ControllerModel& model = alone.controller.model;
   if (model.follows.quad_mass) model.vehicle.quad_mass = alone.vehicle.quad_mass;
   if (model.follows.load_mass) model.vehicle.load_mass = alone.vehicle.load_mass;

@@ -92,6 +92,10 @@ struct VehicleVariant {
   std::optional<double> quad_mass;                   ///< kg; none: that of `vehicle`
   std::optional<double> load_mass;                   ///< kg
   std::optional<double> rod_length;                  ///< m
+  std::optional<double> thrust_scale;                ///< none: that of `plant.thrust`
+  std::optional<Eigen::Vector3d> v_WQ;               ///< at step 0, m/s
+  std::optional<Eigen::Quaterniond> q_WB;            ///< at step 0
+  std::optional<Eigen::Vector3d> w_WB_B;             ///< at step 0, rad/s
 };
 
 // --- plant -------------------------------------------------------------------------------------
@@ -104,9 +108,58 @@ struct InitialState {
   Body placed = Body::kLoad;                           ///< `load_position_m` or `quad_position_m`
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< of the placed body, m
   Eigen::Vector3d v_WQ = Eigen::Vector3d::Zero();      ///< quadrotor velocity, m/s
+  bool has_own_velocity = false;  ///< of the one vehicle, not of all: not a key
   model::RodAngles rod;
   std::optional<Eigen::Quaterniond> q_WB;  ///< of plants whose vehicles turn; none: level
   std::optional<Eigen::Vector3d> w_WB_B;   ///< the same, rad/s; none: at rest
+};
+
+/// A change of the wind: it comes within `rise`, stays, and goes within `rise`.
+struct Gust {
+  std::int64_t at_ns = 0;
+  std::int64_t rise_ns = 0;
+  std::optional<std::int64_t> for_ns;                  ///< until it begins to go; none: stays
+  Eigen::Vector3d v_wind_W = Eigen::Vector3d::Zero();  ///< that it adds, m/s
+};
+
+/// Dryden turbulence at low altitude, MIL-F-8785C, carried by the mean wind.
+struct Turbulence {
+  double altitude = 10.0;  ///< above the ground, m, 3 to 300
+  double w20 = 0.0;        ///< wind at 20 ft (6.096 m), which sets the intensity, m/s
+  std::uint64_t seed = 0;
+};
+
+/// What changes the wind of `Plant::air`.
+struct Wind {
+  std::vector<Gust> gusts;
+  std::optional<Turbulence> turbulence;
+
+  bool varies() const { return !gusts.empty() || turbulence; }
+};
+
+/// The voltage that turns the rotors of a vehicle.
+struct Battery {
+  double full_v = 0.0;          ///< open-circuit voltage, charged: that of the thrust constants
+  double empty_v = 0.0;         ///< the same, discharged
+  double resistance_ohm = 0.0;  ///< internal
+  double capacity_ah = 0.0;
+  double hover_power_w = 0.0;  ///< of a vehicle that carries its share of the load
+};
+
+/// From a time on a rotor, or a point mass as a whole, gives another share of its thrust.
+struct ThrustFailure {
+  std::int64_t at_ns = 0;
+  int vehicle = 0;
+  std::optional<int> rotor;  ///< from 1
+  double scale = 0.0;
+};
+
+/// True thrust per believed thrust.
+struct Thrust {
+  double scale = 1.0;
+  double drift = 0.0;  ///< of the scale, relative, 1/s
+  std::optional<Battery> battery;
+  std::vector<ThrustFailure> failures;
 };
 
 struct Plant {
@@ -114,7 +167,10 @@ struct Plant {
   OwnValues own;
   std::int64_t step_ns = 1'000'000;  ///< integration step
   InitialState initial;
-  model::Aerodynamics air;                                  ///< true drag and wind
+  model::Aerodynamics air;  ///< true drag and mean wind
+  Wind wind;
+  model::LoadDrag load_drag;
+  Thrust thrust;
   Eigen::Vector3d disturbance_W = Eigen::Vector3d::Zero();  ///< d, constant, on the quadrotor, N
 };
 
@@ -395,9 +451,9 @@ struct Scenario {
   /// Follows from plant and vehicles when the file is read: of plants with such a load.
   std::optional<model::SharedLoad> shared_load;
 
-  std::string text;              ///< the file's bytes
-  std::filesystem::path folder;  ///< of the file: paths in it are relative to that
-  std::string sha256;            ///< of those bytes, 64 lower-case hex digits
+  std::string text;                   ///< the file's bytes
+  std::filesystem::path folder;       ///< of the file: paths in it are relative to that
+  std::string sha256;                 ///< of those bytes, 64 lower-case hex digits
   std::vector<std::string> warnings;  ///< of what is allowed but hardly meant, as FILE:LINE: …
 };
 

@@ -49,6 +49,8 @@ inline constexpr NumberRule kWait{"> 0 and at most 1000000 s",
                                   [](double x) { return x > 0.0 && x <= kMaxSeconds; }};
 inline constexpr NumberRule kRate{"from 0.001 to 1000",
                                   [](double x) { return x >= 1e-3 && x <= 1e3; }};
+inline constexpr NumberRule kLowAltitude{"from 3 to 300",
+                                         [](double x) { return x >= 3.0 && x <= 300.0; }};
 inline constexpr NumberRule kFlushInterval{"> 0 and <= 0.2",
                                            [](double x) { return x > 0.0 && x <= 0.2; }};
 
@@ -79,6 +81,7 @@ struct Range {
 };
 inline constexpr Range kControllers{1, 100};
 inline constexpr Range kRecorders{0, 100};
+inline constexpr Range kRotorNumbers{1, 64};
 inline constexpr Range kVehicleIds{0, static_cast<int>(kMaxVehicles) - 1};
 
 /// Bounds of a number that does not fit an int.
@@ -97,6 +100,8 @@ struct ListRange {
 };
 inline constexpr ListRange kStages{1, 1000, "stages"};
 inline constexpr ListRange kFaults{0, 1000, "faults"};
+inline constexpr ListRange kGusts{0, 1000, "gusts"};
+inline constexpr ListRange kFailures{0, 1000, "failures"};
 inline constexpr ListRange kFleet{1, static_cast<int>(kMaxVehicles), "vehicles"};
 
 template <class Enum>
@@ -167,6 +172,10 @@ void describe(Map& map, VehicleVariant& variant) {
   map.key(kOptional, "quad_mass_kg", variant.quad_mass, kPositive);
   map.key(kOptional, "load_mass_kg", variant.load_mass, kPositive);
   map.key(kOptional, "rod_length_m", variant.rod_length, kPositive);
+  map.key(kOptional, "thrust_scale", variant.thrust_scale, kPositive);
+  map.key(kOptional, "quad_velocity_m_s", variant.v_WQ);
+  map.key(kOptional, "attitude", variant.q_WB);
+  map.key(kOptional, "body_rates_rad_s", variant.w_WB_B);
 }
 
 template <class Map>
@@ -190,10 +199,72 @@ void describe(Map& map, InitialState& initial) {
   map.key(kOptional, "body_rates_rad_s", initial.w_WB_B);
 }
 
+template <class Map>
+void describe(Map& map, Gust& gust) {
+  map.key(kRequired, "at_s", gust.at_ns, kNotNegative);
+  map.key(kOptional, "rise_s", gust.rise_ns, kNotNegative);
+  map.key(kOptional, "for_s", gust.for_ns, kPositive);
+  map.key(kRequired, "wind_m_s", gust.v_wind_W);
+}
+
+template <class Map>
+void describe(Map& map, Turbulence& turbulence) {
+  map.key(kRequired, "altitude_m", turbulence.altitude, kLowAltitude);
+  map.key(kRequired, "w20_m_s", turbulence.w20, kPositive);
+  map.key(kOptional, "seed", turbulence.seed, kSeeds);
+}
+
+template <class Map>
+void describe(Map& map, Wind& wind) {
+  map.key(kOptional, "gusts", wind.gusts, kGusts);
+  map.key(kOptional, "turbulence", wind.turbulence);
+}
+
+template <class Map>
+void describe(Map& map, model::LoadDrag& drag) {
+  map.key(kOptional, "linear_n_s_m", drag.linear, kNotNegative);
+  map.key(kOptional, "area_m2", drag.area, kNotNegative);
+  map.key(kOptional, "air_density_kg_m3", drag.air_density, kPositive);
+}
+
+template <class Map>
+void describe(Map& map, Battery& battery) {
+  map.key(kRequired, "full_v", battery.full_v, kPositive);
+  map.key(kRequired, "empty_v", battery.empty_v, kPositive);
+  map.key(kOptional, "resistance_ohm", battery.resistance_ohm, kNotNegative);
+  map.key(kRequired, "capacity_ah", battery.capacity_ah, kPositive);
+  map.key(kRequired, "hover_power_w", battery.hover_power_w, kPositive);
+}
+
+template <class Map>
+void describe(Map& map, ThrustFailure& failure) {
+  map.key(kRequired, "at_s", failure.at_ns, kNotNegative);
+  map.key(kOptional, "vehicle", failure.vehicle, kVehicleIds);
+  map.key(kOptional, "rotor", failure.rotor, kRotorNumbers);
+  map.key(kOptional, "thrust_scale", failure.scale, kNotNegative);
+}
+
+template <class Map>
+void describe(Map& map, Thrust& thrust) {
+  map.key(kOptional, "scale", thrust.scale, kPositive);
+  map.key(kOptional, "drift_per_s", thrust.drift, kFinite);
+  map.key(kOptional, "battery", thrust.battery);
+  map.key(kOptional, "failures", thrust.failures, kFailures);
+}
+
+/// Wind that changes, drag of the load, and what the thrust lacks.
+template <class Map>
+void describe_surroundings(Map& map, Plant& plant) {
+  map.key(kOptional, "wind", plant.wind);
+  map.key(kOptional, "load_drag", plant.load_drag);
+  map.key(kOptional, "thrust", plant.thrust);
+}
+
 /// Effects on the quadrotor of a point-mass plant besides the control force.
 template <class Map>
 void describe_point_mass_loads(Map& map, Plant& plant) {
   describe(map, plant.air);
+  describe_surroundings(map, plant);
   map.key(kOptional, "disturbance_n", plant.disturbance_W);
 }
 

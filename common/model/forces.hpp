@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 
 #include "common/model/dot.hpp"
 #include "common/model/math.hpp"
@@ -18,6 +19,15 @@ inline Eigen::Vector3d calc_rotor_drag(const Eigen::Vector3d& f_Q_W, const Eigen
   const Eigen::Vector3d direction = f_Q_W.stableNormalized();
   const Eigen::Vector3d v_rel = v_WQ - air.v_wind_W;
   return -air.rotor_drag * (v_rel - direction * dot(direction, v_rel));
+}
+
+/// Drag of the load, N, where it moves with `v_WL` in a wind. Eq. (11).
+inline Eigen::Vector3d calc_load_drag(const Eigen::Vector3d& v_WL, const Eigen::Vector3d& v_wind_W,
+                                      const LoadDrag& drag) {
+  const Eigen::Vector3d v_W = v_WL - v_wind_W;
+  double factor = drag.linear;
+  if (drag.area > 0.0) factor += 0.5 * drag.air_density * drag.area * std::sqrt(v_W.squaredNorm());
+  return -factor * v_W;
 }
 
 /// Attitude a multirotor must take so that its thrust along −z of the body is `f_Q_W`.

@@ -21,6 +21,15 @@ struct Aerodynamics {
   Eigen::Vector3d v_wind_W = Eigen::Vector3d::Zero();  ///< velocity of the air, m/s
 };
 
+/// Drag of the load: −(linear + ½ air_density area |v|) v, with its velocity v through the air.
+struct LoadDrag {
+  double linear = 0.0;         ///< N·s/m
+  double area = 0.0;           ///< with the drag coefficient: c_d A, m²
+  double air_density = 1.225;  ///< kg/m³
+
+  bool acts() const { return linear > 0.0 || area > 0.0; }
+};
+
 inline bool operator==(const SlungLoadParameters& a, const SlungLoadParameters& b) {
   return a.quad_mass == b.quad_mass && a.load_mass == b.load_mass && a.rod_length == b.rod_length &&
          a.gravity == b.gravity;

@@ -28,7 +28,7 @@ struct SharedLoad {
   std::vector<Cable> cables;                                 ///< of each vehicle
   /// Further signals, if the plant has them: 1 if the own cable is cut, and if the load stands.
   std::optional<Eigen::Index> released, on_ground;
-  std::optional<double> ground_z_W;                          ///< m; none: no ground
+  std::optional<double> ground_z_W;  ///< m; none: no ground
 };
 
 /// The desired attitude of a shared load. It turns about one axis, which is fixed in the load and

@@ -59,6 +59,7 @@ struct PlantSetup {
     std::uint32_t id = 0;
     model::SlungLoadParameters parameters;
     config::InitialState initial;
+    double thrust_scale = 1.0;  ///< that of `plant.thrust`, or its own
   };
   config::Plant plant;            ///< without `initial`, which each vehicle has
   config::Autopilot autopilot;    ///< for plants that use one

@@ -7,6 +7,7 @@
 #include "common/config/vehicle_ids.hpp"
 #include "sim_server/plants/plant.hpp"
 #include "sim_server/plants/sensing/sensed_plant.hpp"
+#include "sim_server/plants/thrust/thrust_source.hpp"
 
 namespace sls::sim {
 
@@ -61,6 +62,10 @@ void check_signals(const std::vector<Signal>& signals, const config::ModelName& 
   }
 }
 
+PlantSetup::Vehicle make_setup_of(const config::Scenario& alone, std::uint32_t id) {
+  return {id, alone.vehicle, alone.plant.initial, alone.plant.thrust.scale};
+}
+
 /// A plant that moves `vehicles`.
 std::unique_ptr<Plant> make_plant_of(const PlantType& type, const config::Scenario& scenario,
                                      const std::vector<PlantSetup::Vehicle>& vehicles) {
@@ -70,7 +75,7 @@ std::unique_ptr<Plant> make_plant_of(const PlantType& type, const config::Scenar
   setup.folder = scenario.folder;
   setup.estimator = scenario.estimator;
   setup.vehicles = vehicles;
-  auto plant = make_sensed(type.make(setup), setup, scenario);
+  auto plant = make_sensed(make_tired(type.make(setup), setup), setup, scenario);
   check_signals(plant->signals(), scenario.plant.model);
   return plant;
 }
@@ -79,15 +84,14 @@ std::unique_ptr<Plant> make_plant_of(const PlantType& type, const config::Scenar
 
 std::unique_ptr<Plant> make_plant(const PlantType& type, const config::Scenario& alone,
                                   std::uint32_t id) {
-  return make_plant_of(type, alone, {{id, alone.vehicle, alone.plant.initial}});
+  return make_plant_of(type, alone, {make_setup_of(alone, id)});
 }
 
 std::vector<PlantOfVehicles> make_plants(const PlantType& type, const config::Scenario& fleet,
                                          const std::vector<std::uint32_t>& ids) {
   std::vector<PlantSetup::Vehicle> vehicles;
   for (const std::uint32_t id : ids) {
-    const config::Scenario alone = config::make_vehicle_scenario(fleet, id);
-    vehicles.push_back({id, alone.vehicle, alone.plant.initial});
+    vehicles.push_back(make_setup_of(config::make_vehicle_scenario(fleet, id), id));
   }
   std::vector<PlantOfVehicles> plants;
   if (type.moves == Moves::kAllVehicles) {

@@ -9,7 +9,9 @@ namespace sls::sim {
 
 AnalyticPlant::AnalyticPlant(const model::SlungLoadParameters& vehicle, const config::Plant& plant)
     : vehicle_(vehicle),
-      air_(plant.air),
+      quad_air_(plant.air),
+      air_(plant),
+      load_wind_W_(plant.air.v_wind_W),
       disturbance_W_(plant.disturbance_W),
       step_s_(1e-9 * static_cast<double>(plant.step_ns)),
       total_mass_(vehicle.total_mass()),
@@ -22,8 +24,7 @@ AnalyticPlant::AnalyticPlant(const model::SlungLoadParameters& vehicle, const co
   motion_.v_WC = plant.initial.v_WQ + arm_ * rod.n_dot_W;
   motion_.n_W = rod.n_W;
   motion_.w_W = rod.n_W.cross(rod.n_dot_W);
-  measurement_ = to_state(motion_);
-  check_finite(measurement_, 0);
+  measurement_ = measure(0, motion_);
 }
 
 AnalyticPlant::Motion AnalyticPlant::add(const Motion& motion, double h, const Motion& rate) {
@@ -35,11 +36,18 @@ AnalyticPlant::Motion AnalyticPlant::calc_rate(const Motion& motion,
                                                const Eigen::Vector3d& f_Q_W) const {
   const Eigen::Vector3d n_dot_W = motion.w_W.cross(motion.n_W);
   Eigen::Vector3d force_W = f_Q_W + disturbance_W_;
-  if (air_.rotor_drag != 0.0)
-    force_W += model::calc_rotor_drag(f_Q_W, motion.v_WC - arm_ * n_dot_W, air_);
+  if (quad_air_.rotor_drag != 0.0)
+    force_W += model::calc_rotor_drag(f_Q_W, motion.v_WC - arm_ * n_dot_W, quad_air_);
   // Eqs. (1) and (2).
-  return {motion.v_WC, force_W / total_mass_ + vehicle_.gravity * Eigen::Vector3d::UnitZ(), n_dot_W,
-          -inverse_inertia_ * motion.n_W.cross(force_W)};
+  Motion rate{motion.v_WC, force_W / total_mass_ + vehicle_.gravity * Eigen::Vector3d::UnitZ(),
+              n_dot_W, -inverse_inertia_ * motion.n_W.cross(force_W)};
+  if (air_.drags_load()) {
+    const Eigen::Vector3d v_WL = motion.v_WC + (vehicle_.rod_length - arm_) * n_dot_W;
+    const Eigen::Vector3d drag_W = air_.calc_load_drag(v_WL, load_wind_W_);
+    rate.v_WC += drag_W / total_mass_;
+    rate.w_W += motion.n_W.cross(drag_W) / (vehicle_.load_mass * vehicle_.rod_length);
+  }
+  return rate;
 }
 
 AnalyticPlant::Motion AnalyticPlant::calc_next(const Motion& start,
@@ -59,12 +67,33 @@ AnalyticPlant::Motion AnalyticPlant::calc_next(const Motion& start,
 void AnalyticPlant::advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_t steps) {
   check_finite(f_Q_W[0], steps_, "force_x_n", "force_y_n", "force_z_n");
   Motion motion = motion_;
-  for (std::int64_t i = 0; i < steps; ++i) motion = calc_next(motion, f_Q_W[0]);
-  const model::SlungLoadState state = to_state(motion);
-  check_finite(state, steps_ + steps);
+  for (std::int64_t i = 0; i < steps; ++i) {
+    if (air_.varies()) hold_wind(steps_ + i, motion);
+    motion = calc_next(motion, f_Q_W[0]);
+  }
+  measurement_ = measure(steps_ + steps, motion);
   motion_ = motion;
-  static_cast<model::SlungLoadState&>(measurement_) = state;
   steps_ += steps;
+}
+
+void AnalyticPlant::hold_wind(std::int64_t step, const Motion& motion) {
+  const double start = static_cast<double>(step) * step_s_;
+  const model::SlungLoadState state = to_state(motion);
+  quad_air_.v_wind_W = air_.calc_held_wind(start, step_s_, state.p_WQ, state.v_WQ);
+  load_wind_W_ = air_.calc_held_wind(start, step_s_, state.p_WL, state.v_WL);
+}
+
+model::Measurement AnalyticPlant::measure(std::int64_t step, const Motion& motion) const {
+  model::Measurement measured(to_state(motion));
+  check_finite(measured, step);
+  air_.add_signals(static_cast<double>(step) * step_s_, measured);
+  return measured;
+}
+
+std::vector<Signal> AnalyticPlant::signals() const {
+  std::vector<Signal> signals;
+  air_.list_signals(signals);
+  return signals;
 }
 
 model::SlungLoadState AnalyticPlant::to_state(const Motion& motion) const {

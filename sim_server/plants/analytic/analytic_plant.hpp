@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "sim_server/plants/air/air.hpp"
 #include "sim_server/plants/plant.hpp"
 
 namespace sls::sim {
@@ -18,6 +19,7 @@ class AnalyticPlant : public Plant {
 
   void advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_t steps) override;
   const model::Measurement& measurement(std::size_t) const override { return measurement_; }
+  std::vector<Signal> signals() const override;
 
  private:
   /// The motion, or its rate of change.
@@ -31,10 +33,14 @@ class AnalyticPlant : public Plant {
   static Motion add(const Motion& motion, double h, const Motion& rate);
   Motion calc_rate(const Motion& motion, const Eigen::Vector3d& f_Q_W) const;
   Motion calc_next(const Motion& start, const Eigen::Vector3d& f_Q_W) const;
+  void hold_wind(std::int64_t step, const Motion& motion);
   model::SlungLoadState to_state(const Motion& motion) const;
+  model::Measurement measure(std::int64_t step, const Motion& motion) const;
 
   const model::SlungLoadParameters vehicle_;
-  const model::Aerodynamics air_;
+  model::Aerodynamics quad_air_;  // with the wind held over a step
+  const Air air_;
+  Eigen::Vector3d load_wind_W_;  // held over a step, m/s
   const Eigen::Vector3d disturbance_W_;
   const double step_s_;
   const double total_mass_;       // m + m_L, kg

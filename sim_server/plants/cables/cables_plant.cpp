@@ -38,6 +38,7 @@ CablesPlant::CablesPlant(const PlantSetup& setup)
 
 CablesPlant::CablesPlant(const PlantSetup& setup, const cables::Start& start)
     : system_(start.system),
+      air_(setup.plant),
       step_s_(1e-9 * static_cast<double>(setup.plant.step_ns)),
       motion_(start.system, start.motion),
       phases_(setup.vehicles.size()),
@@ -45,6 +46,9 @@ CablesPlant::CablesPlant(const PlantSetup& setup, const cables::Start& start)
       remark_counts_(setup.vehicles.size()),
       named_step_ns_(setup.plant.step_ns) {
   actions_.air = setup.plant.air;
+  actions_.load_drag = setup.plant.load_drag;
+  actions_.load_wind_W = setup.plant.air.v_wind_W;
+  if (air_.varies()) actions_.v_wind_W = &v_wind_W_;
   actions_.disturbance_W = setup.plant.disturbance_W;
   if (const auto& airframe = setup.plant.own.get<CablesKeys>().airframe) {
     rotors_.emplace(*airframe, setup, motion_);
@@ -52,6 +56,8 @@ CablesPlant::CablesPlant(const PlantSetup& setup, const cables::Start& start)
   }
   plan(setup.plant.own.get<CablesKeys>());
   signals_ = list_signals();
+  own_signals_ = static_cast<Eigen::Index>(signals_.size());
+  air_.list_signals(signals_);
   for (std::size_t i = 0; i < system_.count; ++i) {
     measurements_.push_back(measure(i));
     check_finite(measurements_[i], 0);
@@ -105,6 +111,7 @@ void CablesPlant::plan(const CablesKeys& keys) {
 /// A step of the plant, in parts where something changes inside it.
 void CablesPlant::fly_step() {
   const double start = static_cast<double>(steps_) * step_s_;
+  if (air_.varies()) hold_wind(start);
   if (rotors_) rotors_->begin_step(actions_.f_Q_W, steps_, motion_);
   for (double flown = 0.0; flown < step_s_;) {
     double until = step_s_;
@@ -131,6 +138,16 @@ void CablesPlant::fly_step() {
   }
   if (motion_.energy_error() > cables::HybridMotion::kCoarse) judge_step();
   if (rotors_) rotors_->end_step(motion_);
+}
+
+/// The wind over the step that begins at `start`, s.
+void CablesPlant::hold_wind(double start) {
+  const cables::Motion& motion = motion_.motion();
+  for (std::size_t i = 0; i < system_.count; ++i)
+    v_wind_W_[i] =
+        air_.calc_held_wind(start, step_s_, motion.vehicles[i].p_W, motion.vehicles[i].v_W);
+  actions_.load_wind_W = air_.calc_held_wind(start, step_s_, motion.p_WL, motion.v_WL);
+  if (rotors_) rotors_->set_wind(v_wind_W_);
 }
 
 /// Names a step that is too coarse: once, and again when only half of the named step would do.
@@ -195,7 +212,7 @@ model::Measurement CablesPlant::measure(std::size_t vehicle) const {
   const bool is_taut = motion_.taut().has(vehicle);
   Eigen::Index count = 0;
   const auto add = [&](double number) { measured.signals[count++] = number; };
-  measured.signals.resize(static_cast<Eigen::Index>(signals_.size()));
+  measured.signals.resize(own_signals_);
   for (const double number : {std::max(tension, 0.0), own.length, is_taut ? 1.0 : 0.0, q[0], q[1],
                               q[2], q[3], motion.w_WL_L.x(), motion.w_WL_L.y(), motion.w_WL_L.z()})
     add(number);
@@ -205,8 +222,10 @@ model::Measurement CablesPlant::measure(std::size_t vehicle) const {
     for (const std::size_t body : {cables::kLoad, vehicle}) add(motion_.standing().has(body));
   if (rotors_) {
     measured.attitude = cables::to_attitude(motion.turns[vehicle]);
-    for (const double number : rotors_->calc_signals(vehicle, motion_)) add(number);
+    for (const double number : rotors_->calc_signals(vehicle, motion_, steps_)) add(number);
   }
+  air_.add_signals(static_cast<double>(steps_) * step_s_, own.p_W, motion.p_WL, motion.v_WL,
+                   measured.signals);
   return measured;
 }
 

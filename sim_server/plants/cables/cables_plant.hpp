@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "sim_server/plants/air/air.hpp"
 #include "sim_server/plants/cables/flying_rotors.hpp"
 #include "sim_server/plants/cables/hybrid_motion.hpp"
 #include "sim_server/plants/cables/start.hpp"
@@ -47,6 +48,7 @@ class CablesPlant : public Plant {
   void plan(const CablesKeys& keys);
   std::vector<Signal> list_signals() const;
   void fly_step();
+  void hold_wind(double start);
   void apply(const Change& change);
   model::Measurement measure(std::size_t vehicle) const;
   void note(const cables::Event& event);
@@ -57,6 +59,8 @@ class CablesPlant : public Plant {
   void remark(std::size_t vehicle, Topic topic, const std::string& text);
 
   const cables::System system_;
+  const Air air_;
+  cables::Vectors v_wind_W_;  // at each vehicle, held over a step, m/s
   const double step_s_;
   cables::HybridMotion motion_;
   std::optional<cables::FlyingRotors> rotors_;  // none: point masses
@@ -67,6 +71,7 @@ class CablesPlant : public Plant {
   std::vector<std::optional<cables::WinchPhase>> phases_;  // that hold now, of each cable
   bool has_winch_ = false, has_release_ = false;           // any cable
   std::vector<Signal> signals_;
+  Eigen::Index own_signals_;           // those before the signals of the air
   std::vector<cables::Event> events_;  // of one step; a member to avoid allocation
   std::vector<model::Measurement> measurements_;
   std::vector<std::vector<std::string>> remarks_;

@@ -10,7 +10,8 @@ model::Attitude to_attitude(const Turn& turn) {
 }
 
 FlyingRotors::FlyingRotors(const AirframeKeys& keys, const PlantSetup& setup, HybridMotion& motion)
-    : v_wind_W_(setup.plant.air.v_wind_W), torque_W_(keys.disturbance_torque) {
+    : torque_W_(keys.disturbance_torque) {
+  v_wind_W_.fill(setup.plant.air.v_wind_W);
   for (std::size_t i = 0; i < setup.vehicles.size(); ++i) {
     RotorDrive& drive = drives_.emplace_back(keys, setup, i);
     const model::SlungLoadParameters& vehicle = setup.vehicles[i].parameters;
@@ -58,7 +59,7 @@ RotorLoads FlyingRotors::calc_loads(std::size_t vehicle, const Motion& motion,
   if (const auto& direction_W = drive.state().output.direction_W)
     direction_B = R_WB.transpose() * *direction_W;
   return drive.calc_loads(speeds.data() + vehicle * drive.size(),
-                          R_WB.transpose() * (motion.vehicles[vehicle].v_W - v_wind_W_),
+                          R_WB.transpose() * (motion.vehicles[vehicle].v_W - v_wind_W_[vehicle]),
                           motion.turns[vehicle].w_WB_B, direction_B);
 }
 
@@ -71,10 +72,11 @@ void FlyingRotors::push(const Motion& motion, const RotorSpeeds& speeds, Actions
   }
 }
 
-model::Numbers FlyingRotors::calc_signals(std::size_t vehicle, const HybridMotion& motion) const {
+model::Numbers FlyingRotors::calc_signals(std::size_t vehicle, const HybridMotion& motion,
+                                          std::int64_t step) const {
   const Matrix3d R_WB = calc_rotation(motion.motion().turns[vehicle].q_WB);
   const RotorLoads loads = calc_loads(vehicle, motion.motion(), motion.rotors(), R_WB);
-  return drives_[vehicle].calc_signals(loads.thrust);
+  return drives_[vehicle].calc_signals(loads.thrust, step);
 }
 
 }  // namespace sls::sim::cables

@@ -17,6 +17,7 @@ class FlyingRotors : public Propulsion {
   /// @throws config::ConfigError if an autopilot refuses the setup.
   FlyingRotors(const AirframeKeys& keys, const PlantSetup& setup, HybridMotion& motion);
 
+  void set_wind(const Vectors& v_wind_W) { v_wind_W_ = v_wind_W; }
   /// At the beginning of the plant's `step`: autopilots, whose set-points are then held.
   void begin_step(const Vectors& f_Q_W, std::int64_t step, HybridMotion& motion);
   void end_step(const HybridMotion& motion);
@@ -29,14 +30,15 @@ class FlyingRotors : public Propulsion {
   std::vector<std::string> take_remarks(std::size_t vehicle) {
     return drives_[vehicle].take_remarks();
   }
-  model::Numbers calc_signals(std::size_t vehicle, const HybridMotion& motion) const;
+  model::Numbers calc_signals(std::size_t vehicle, const HybridMotion& motion,
+                              std::int64_t step) const;
 
  private:
   RotorLoads calc_loads(std::size_t vehicle, const Motion& motion, const RotorSpeeds& speeds,
                         const Eigen::Matrix3d& R_WB) const;
 
   std::vector<RotorDrive> drives_;  // with the same number of rotors
-  const Eigen::Vector3d v_wind_W_;
+  Vectors v_wind_W_;                // at each vehicle, held over a step, m/s
   const Eigen::Vector3d torque_W_;  // disturbance on each vehicle, N·m
 };
 

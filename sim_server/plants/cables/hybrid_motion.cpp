@@ -201,8 +201,8 @@ void HybridMotion::put_on_ground(const Members& bodies) {
   set_standing(unite(mode_.standing, bodies));
 }
 
-/// The cables at their length whose ends neither approach nor move apart: where those of a slack one
-/// do, it arrives, and an impact follows.
+/// The cables at their length whose ends neither approach nor move apart: where those of a slack
+/// one do, it arrives, and an impact follows.
 Members HybridMotion::find_touching(const Instant& instant) const {
   const double speed = instant.motion.v_WL.lpNorm<1>(), place = instant.motion.p_WL.lpNorm<1>();
   const double least = -kTouching * (1.0 + place), rounding = kTouching * (1.0 + speed);
@@ -647,7 +647,7 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
     return actions.length_acceleration[i] != 0.0 || now().motion.vehicles[i].length_rate != 0.0;
   };
   does_work_vary_ = actions.propulsion || actions.air.rotor_drag != 0.0 ||
-                    std::any_of(uncut_.begin(), uncut_.end(), winds);
+                    actions.load_drag.acts() || std::any_of(uncut_.begin(), uncut_.end(), winds);
   double time = 0.0;
   for (int count = 1;; ++count) {
     is_later_ = count > 1;

@@ -3,10 +3,12 @@
 #include <algorithm>
 
 #include "common/config/own_keys.hpp"
+#include "sim_server/plants/air/air.hpp"
 #include "sim_server/plants/cables/hybrid_motion.hpp"
 #include "sim_server/plants/cables/start.hpp"
 #include "sim_server/plants/cables/winch.hpp"
 #include "sim_server/plants/inertia.hpp"
+#include "sim_server/plants/thrust/thrust_source.hpp"
 
 namespace sls::sim {
 namespace {
@@ -16,8 +18,13 @@ std::string show(const Eigen::Vector3d& v) {
          config::to_text(v.z()) + "]";
 }
 
-/// With the signals of cable, load, winch, release and ground those of so many rotors fit.
-constexpr std::size_t kMostRotors = (model::kMaxNumbers - 14 - 6) / 2;
+/// With the signals of cable, load, winch, release, ground, air and thrust those of so many rotors
+/// fit.
+std::size_t count_most_rotors(const config::Scenario& scenario) {
+  return (model::kMaxNumbers - 14 - 6 - Air::count_signals(scenario.plant) -
+          count_thrust_signals(scenario)) /
+         2;
+}
 
 class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
   bool has_attitude(const config::Plant& plant) const override {
@@ -84,9 +91,10 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
       throw places.make_error_at(
           "plant.rotor_drag_n_s_m",
           "of point masses; the drag of plant.rotors is drag_constant_n_s2_m of plant.rotor");
-    if (keys.airframe->rotors.size() > kMostRotors)
+    const std::size_t most = count_most_rotors(scenario);
+    if (keys.airframe->rotors.size() > most)
       throw places.make_error_at("plant.rotors",
-                                 "expected at most " + std::to_string(kMostRotors) +
+                                 "expected at most " + std::to_string(most) +
                                      ", whose signals fit beside those of a cable, got " +
                                      std::to_string(keys.airframe->rotors.size()));
     check_airframe(*keys.airframe, places);
@@ -220,6 +228,11 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
       const std::string cable = "plant.cables[" + std::to_string(id) + "]";
       const double length = alone.vehicle.rod_length;
       const double distance = get_cable(keys, id).distance.value_or(0.0);
+      for (const char* rate : {".alpha_dot_rad_s", ".beta_dot_rad_s"})
+        if (id > 0 && alone.plant.initial.has_own_velocity && places.has(cable + rate))
+          throw places.make_error_at(
+              cable + rate,
+              "expected this or vehicles[" + std::to_string(id) + "].quad_velocity_m_s, got both");
       if (distance > length)
         throw places.make_error_at(cable + ".distance_m", "expected at most the cable's length (" +
                                                               config::to_text(length) + "), got " +

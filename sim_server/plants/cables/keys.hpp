@@ -31,6 +31,7 @@ struct CableKeys {
   Eigen::Vector3d attachment = Eigen::Vector3d::Zero();  ///< in the load, m
   std::optional<double> distance;                        ///< at the start, m; none: taut
   std::optional<double> alpha, beta;                     ///< at the start; none: of plant.initial
+  std::optional<double> alpha_dot, beta_dot;             ///< the same, rad/s
   std::optional<WinchKeys> winch;                        ///< none: a constant length
   std::optional<std::int64_t> release_ns;                ///< when it is cut; none: never
 };
@@ -82,6 +83,8 @@ void describe(Map& map, CableKeys& cable) {
   map.key(kOptional, "distance_m", cable.distance, config::kPositive);
   map.key(kOptional, "alpha_rad", cable.alpha, config::kFullTurn);
   map.key(kOptional, "beta_rad", cable.beta, config::kHalfTurn);
+  map.key(kOptional, "alpha_dot_rad_s", cable.alpha_dot, config::kFinite);
+  map.key(kOptional, "beta_dot_rad_s", cable.beta_dot, config::kFinite);
   map.key(kOptional, "winch", cable.winch);
   map.key(kOptional, "release_s", cable.release_ns, config::kPositive);
 }

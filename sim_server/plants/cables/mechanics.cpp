@@ -117,8 +117,11 @@ void calc_matrix(const System& system, const Geometry& geometry, const Members& 
 
 Vector3d calc_force(const Actions& actions, const Vehicle& vehicle, std::size_t i) {
   Vector3d force = actions.f_Q_W[i] + actions.disturbance_W;
-  if (actions.air.rotor_drag != 0.0)
-    force += model::calc_rotor_drag(actions.f_Q_W[i], vehicle.v_W, actions.air);
+  if (actions.air.rotor_drag != 0.0) {
+    model::Aerodynamics air = actions.air;
+    if (actions.v_wind_W) air.v_wind_W = (*actions.v_wind_W)[i];
+    force += model::calc_rotor_drag(actions.f_Q_W[i], vehicle.v_W, air);
+  }
   return force;
 }
 
@@ -126,6 +129,9 @@ void calc_free_rate(const System& system, const Motion& motion, const Actions& a
                     Motion& rate) {
   rate.p_WL = motion.v_WL;
   rate.v_WL = {0.0, 0.0, stands(system.load_mass) ? 0.0 : system.gravity};
+  if (actions.load_drag.acts())
+    rate.v_WL += model::calc_load_drag(motion.v_WL, actions.load_wind_W, actions.load_drag) /
+                 system.load_mass;
   if (system.is_rigid) {
     const Vector3d& w = motion.w_WL_L;
     rate.q_WL = calc_quaternion_rate(motion.q_WL, w);

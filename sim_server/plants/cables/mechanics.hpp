@@ -73,6 +73,9 @@ struct Actions {
   /// If it is there, HybridMotion takes force and torque from it, at every instant.
   const Propulsion* propulsion = nullptr;
   model::Aerodynamics air;
+  const Vectors* v_wind_W = nullptr;  ///< at each vehicle, m/s; none: that of `air`
+  model::LoadDrag load_drag;
+  Eigen::Vector3d load_wind_W = Eigen::Vector3d::Zero();    ///< at the load, m/s
   Eigen::Vector3d disturbance_W = Eigen::Vector3d::Zero();  ///< on each vehicle, N
   Vector length_acceleration{};                             ///< of each cable, m/s²
 };

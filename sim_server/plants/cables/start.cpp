@@ -24,6 +24,8 @@ Placed place_cable(const CablesKeys& keys, const PlantSetup::Vehicle& vehicle, s
   model::RodAngles angles = vehicle.initial.rod;
   angles.alpha = cable.alpha.value_or(angles.alpha);
   angles.beta = cable.beta.value_or(angles.beta);
+  angles.alpha_dot = cable.alpha_dot.value_or(angles.alpha_dot);
+  angles.beta_dot = cable.beta_dot.value_or(angles.beta_dot);
   Placed placed;
   placed.rod = model::to_direction(angles);
   placed.distance = cable.distance.value_or(vehicle.parameters.rod_length);
@@ -83,6 +85,7 @@ Start make_start(const CablesKeys& keys, const std::vector<PlantSetup::Vehicle>&
         motion.v_WL + w_W.cross(placed.p_LE_W) - placed.distance * placed.rod.n_dot_W,
         vehicles[i].parameters.rod_length, 0.0};
     const config::InitialState& initial = vehicles[i].initial;
+    if (i > 0 && initial.has_own_velocity) motion.vehicles[i].v_W = initial.v_WQ;
     const Eigen::Quaterniond q = initial.q_WB.value_or(Eigen::Quaterniond::Identity());
     motion.turns[i] = {{q.w(), q.x(), q.y(), q.z()}, initial.w_WB_B.value_or(Vector3d::Zero())};
   }

@@ -34,6 +34,7 @@ std::vector<FlyingRotor> make_rotors(const AirframeKeys& keys) {
     rotor.lag_up = own.lag_up.value_or(all.lag_up);
     rotor.lag_down = own.lag_down.value_or(all.lag_down);
     rotor.thrust_loss_speed = own.thrust_loss_speed.value_or(all.thrust_loss_speed);
+    rotor.thrust_scale = described.thrust_scale;
     rotors.push_back(rotor);
   }
   return rotors;

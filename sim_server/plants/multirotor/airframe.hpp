@@ -16,6 +16,7 @@ struct FlyingRotor : Rotor {
   double lag_up = 0.0;             ///< s
   double lag_down = 0.0;           ///< s
   double thrust_loss_speed = 0.0;  ///< m/s; 0: no loss
+  double thrust_scale = 1.0;       ///< true thrust per that of thrust_constant
 };
 
 /// The rotors that the keys describe, their axes of length 1.

@@ -32,6 +32,7 @@ struct RotorKeys {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< in B, m
   Eigen::Vector3d axis = -Eigen::Vector3d::UnitZ();    ///< of the thrust, in B; any length but 0
   Spin spin = Spin::kCounterClockwise;
+  double thrust_scale = 1.0;                ///< true thrust per believed thrust
   RotorNumbers<std::optional<double>> own;  ///< overrides of `plant.rotor`
 };
 
@@ -90,6 +91,7 @@ void describe(Map& map, RotorKeys& rotor) {
   map.key(config::kRequired, "position_m", rotor.position);
   map.key(config::kOptional, "axis", rotor.axis);
   map.key(config::kRequired, "spin", rotor.spin);
+  map.key(config::kOptional, "thrust_scale", rotor.thrust_scale, config::kNotNegative);
   describe_numbers(map, config::kOptional, rotor.own);
 }
 

@@ -44,6 +44,7 @@ void describe_own(Map& map, config::Plant& plant, MultirotorKeys& keys) {
   map.key(kOptional, "rod", keys.rod);
   map.key(kOptional, "load_inertia_kg_m2", keys.load_inertia, kNotNegative);
   map.key(kOptional, "wind_m_s", plant.air.v_wind_W);
+  config::describe_surroundings(map, plant);
   map.key(kOptional, "disturbance_n", plant.disturbance_W);
   map.key(kOptional, "disturbance_torque_n_m", keys.disturbance_torque);
 }

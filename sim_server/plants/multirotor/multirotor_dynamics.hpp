@@ -51,9 +51,16 @@ class MultirotorDynamics {
     double tension;      ///< force of the joint along the rod, N
   };
 
+  /// A force on the load.
+  struct LoadForce {
+    SimTK::Vec3 force_W;  ///< N
+    double distance;      ///< of the load below the joint, m
+  };
+
   /// Accelerations under gravity, `force_W` at the body's origin (N) and `torque_W` about it (N·m).
   Accelerations calc_accelerations(const Rotations& at, const SimTK::Vec3& force_W,
-                                   const SimTK::Vec3& torque_W) const {
+                                   const SimTK::Vec3& torque_W,
+                                   const LoadForce* on_load = nullptr) const {
     const SimTK::Rotation& R_WB = at.R_WB;
     const SimTK::Vec3 w_B = ~R_WB * at.w_WB_W, force_B = ~R_WB * force_W;
     // Eq. (7): the body without its pendulum.
@@ -62,8 +69,8 @@ class MultirotorDynamics {
     const SimTK::Vec3 free_a_WC = gravity_W_ + force_W / mass_;
     const SimTK::Vec3 free_a_WA = free_a_WC + R_WB * (free_b_B % p_CA_B_ + w_B % (w_B % p_CA_B_));
 
-    const JointForce joint =
-        kind_ == PendulumBody::kPoint ? hold_point(at, free_a_WA) : hold_rigid(at, free_a_WA);
+    const JointForce joint = kind_ == PendulumBody::kPoint ? hold_point(at, free_a_WA, on_load)
+                                                           : hold_rigid(at, free_a_WA, on_load);
     // Eq. (12).
     const SimTK::Vec3 b_B = free_b_B + inverse_inertia_B_ * (p_CA_B_ % (~R_WB * joint.on_body_W));
     const SimTK::Vec3 a_WC = free_a_WC + joint.on_body_W / mass_;
@@ -78,23 +85,33 @@ class MultirotorDynamics {
   };
 
   /// Eqs. (8) and (9): a point load, which can only be pulled along the rod.
-  JointForce hold_point(const Rotations& at, const SimTK::Vec3& free_a_WA) const {
+  JointForce hold_point(const Rotations& at, const SimTK::Vec3& free_a_WA,
+                        const LoadForce* on_load) const {
+    SimTK::Vec3 free_a_WL = gravity_W_;
+    if (on_load) free_a_WL += on_load->force_W / pendulum_mass_;
     const SimTK::Vec3 n_W = at.R_WP.z(), n_dot_W = at.w_WP_W % n_W;
     const SimTK::Vec3 moved_W = at.R_WB * (mobility_B_ * (~at.R_WB * n_W));  // m/s² per N
-    const double tension = (~n_W * (gravity_W_ - free_a_WA) + centre_ * n_dot_W.normSqr()) /
+    const double tension = (~n_W * (free_a_WL - free_a_WA) + centre_ * n_dot_W.normSqr()) /
                            (1.0 / pendulum_mass_ + ~n_W * moved_W);
-    const SimTK::Vec3 a_WL = gravity_W_ - tension / pendulum_mass_ * n_W;
+    const SimTK::Vec3 a_WL = free_a_WL - tension / pendulum_mass_ * n_W;
     const SimTK::Vec3 n_ddot_W = (a_WL - free_a_WA - tension * moved_W) / centre_;
     return {tension * n_W, n_W % n_ddot_W - (~at.w_WP_W * n_W) * (n_W % at.w_WP_W)};
   }
 
   /// Eqs. (10) and (11): rod and load as one body. Computed in P.
-  JointForce hold_rigid(const Rotations& at, const SimTK::Vec3& free_a_WA) const {
+  JointForce hold_rigid(const Rotations& at, const SimTK::Vec3& free_a_WA,
+                        const LoadForce* on_load) const {
     const SimTK::Rotation R_PB = ~at.R_WP * at.R_WB;
     const SimTK::Vec3 w_P = ~at.R_WP * at.w_WP_W;
     const SimTK::Vec3 p_GA(0, 0, -centre_);  // from the centre of mass to the joint
-    const SimTK::Vec3 free_b_P = inverse_pendulum_inertia_P_ * -(w_P % (pendulum_inertia_P_ * w_P));
-    const SimTK::Vec3 free_a_P = ~at.R_WP * gravity_W_ + free_b_P % p_GA + w_P % (w_P % p_GA);
+    SimTK::Vec3 free_b_P = inverse_pendulum_inertia_P_ * -(w_P % (pendulum_inertia_P_ * w_P));
+    SimTK::Vec3 free_a_WG = gravity_W_;
+    if (on_load) {
+      const SimTK::Vec3 p_GL(0, 0, on_load->distance - centre_);
+      free_b_P += inverse_pendulum_inertia_P_ * (p_GL % (~at.R_WP * on_load->force_W));
+      free_a_WG += on_load->force_W / pendulum_mass_;
+    }
+    const SimTK::Vec3 free_a_P = ~at.R_WP * free_a_WG + free_b_P % p_GA + w_P % (w_P % p_GA);
     const SimTK::Mat33 mobility = R_PB * mobility_B_ * ~R_PB + pendulum_mobility_P_;
     const SimTK::Vec3 on_body_P = solve(mobility, free_a_P - ~at.R_WP * free_a_WA);
     const SimTK::Vec3 b_P = free_b_P - inverse_pendulum_inertia_P_ * (p_GA % on_body_P);

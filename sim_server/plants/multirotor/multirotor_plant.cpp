@@ -1,4 +1,5 @@
 #include "sim_server/plants/multirotor/multirotor_plant.hpp"
+#include "sim_server/plants/air/air.hpp"
 
 #include <Simbody.h>
 
@@ -93,6 +94,9 @@ struct MultirotorPlant::Multibody {
   explicit Multibody(const PlantSetup& setup)
       : keys(setup.plant.own.get<MultirotorKeys>()),
         config(setup.plant),
+        air(setup.plant),
+        quad_wind_W(setup.plant.air.v_wind_W),
+        load_wind_W(setup.plant.air.v_wind_W),
         vehicle(setup.vehicles[0].parameters),
         drive(keys, setup, 0),
         step_s(1e-9 * static_cast<double>(config.step_ns)),
@@ -160,7 +164,7 @@ struct MultirotorPlant::Multibody {
   RotorLoads calc_rotor_loads(const Motion& at, const RotorSpeeds& turning) const {
     const SimTK::Rotation& R_WB = body.getBodyRotation(state);
     const SimTK::Vec3 v_WQ = SimTK::Vec3::getAs(at.u.data() + 3);
-    const Vector3d v_B = to_eigen(~R_WB * (v_WQ - to_simtk(config.air.v_wind_W)));
+    const Vector3d v_B = to_eigen(~R_WB * (v_WQ - to_simtk(quad_wind_W)));
     const Vector3d w_B = to_eigen(~R_WB * SimTK::Vec3::getAs(at.u.data()));
     std::optional<Vector3d> direction_B;
     if (const auto& direction_W = drive.state().output.direction_W)
@@ -177,20 +181,45 @@ struct MultirotorPlant::Multibody {
     return {R_WB, w_WB_W, R_WP, w_WB_W + (is_ideal ? R_WP : R_WB) * beside};
   }
 
-  /// Accelerations at `rotations` under the rotors' loads and the disturbances.
+  /// Accelerations at `at` with its `rotations` under the rotors' loads and the disturbances.
   MultirotorDynamics::Accelerations calc_accelerations(
-      const MultirotorDynamics::Rotations& rotations, const RotorLoads& loads) const {
+      const Motion& at, const MultirotorDynamics::Rotations& rotations,
+      const RotorLoads& loads) const {
     const SimTK::Rotation& R_WB = rotations.R_WB;
-    return dynamics->calc_accelerations(
-        rotations, R_WB * to_simtk(loads.force_B) + to_simtk(config.disturbance_W),
-        R_WB * to_simtk(loads.torque_B) + to_simtk(keys.disturbance_torque));
+    const SimTK::Vec3 force_W = R_WB * to_simtk(loads.force_B) + to_simtk(config.disturbance_W),
+                      torque_W =
+                          R_WB * to_simtk(loads.torque_B) + to_simtk(keys.disturbance_torque);
+    if (!air.drags_load()) return dynamics->calc_accelerations(rotations, force_W, torque_W);
+    const MultirotorDynamics::LoadForce drag{
+        to_simtk(air.calc_load_drag(to_eigen(find_load(at, rotations).v_W), load_wind_W)),
+        vehicle.rod_length};
+    return dynamics->calc_accelerations(rotations, force_W, torque_W, &drag);
+  }
+
+  struct Place {
+    SimTK::Vec3 p_W, v_W;
+  };
+  Place find_load(const Motion& at, const MultirotorDynamics::Rotations& rotations) const {
+    const SimTK::Vec3 p_BA_W = rotations.R_WB * to_simtk(keys.attachment);
+    const SimTK::Vec3 p_AL_W = rotations.R_WP * SimTK::Vec3(0, 0, vehicle.rod_length);
+    return {SimTK::Vec3::getAs(at.q.data() + 4) + p_BA_W + p_AL_W,
+            SimTK::Vec3::getAs(at.u.data() + 3) + rotations.w_WB_W % p_BA_W +
+                rotations.w_WP_W % p_AL_W};
+  }
+
+  /// The wind over the step after `steps`.
+  void hold_wind() {
+    const double start = static_cast<double>(steps) * step_s;
+    const Place load = find_load(motion, find_rotations(motion));
+    quad_wind_W = air.calc_held_wind(start, step_s, motion.q.segment<3>(4), motion.u.segment<3>(3));
+    load_wind_W = air.calc_held_wind(start, step_s, to_eigen(load.p_W), to_eigen(load.v_W));
   }
 
   /// Rate of change of `at`, whose positions must be realized.
   Motion calc_rate(const Motion& at, const RotorSpeeds& turning) const {
     const MultirotorDynamics::Rotations rotations = find_rotations(at);
     const auto& [R_WB, w_WB_W, R_WP, w_WP_W] = rotations;
-    const auto accelerations = calc_accelerations(rotations, calc_rotor_loads(at, turning));
+    const auto accelerations = calc_accelerations(at, rotations, calc_rotor_loads(at, turning));
     // Eq. (13): the pendulum's speeds are relative to the body; of `ideal` in P, of `rigid` in B.
     const SimTK::Vec3 beside_W = accelerations.b_WP_W - accelerations.b_WB_W;
     SimTK::Vec3 beside =
@@ -246,6 +275,7 @@ struct MultirotorPlant::Multibody {
     try {
       for (std::int64_t i = 0; i < count; ++i) {
         drive.step(f_Q_W, motion.u.segment<3>(3), attitude(), steps);
+        if (air.varies()) hold_wind();
         fly_step(steps + 1);
         ++steps;
       }
@@ -276,19 +306,20 @@ struct MultirotorPlant::Multibody {
     result.rod = model::make_state(to_eigen(p_WA), to_eigen(v_WA), result.p_WL, result.v_WL).rod;
     result.attitude = attitude();
     sim::check_finite(result, step);
-    result.signals = calc_signals();
+    result.signals = calc_signals(step);
+    air.add_signals(static_cast<double>(step) * step_s, result);
     return result;
   }
 
-  model::Numbers calc_signals() {
+  model::Numbers calc_signals(std::int64_t step) {
     for (std::size_t i = 0; i < drive.size(); ++i) {
       const double speed = drive.state().speeds[static_cast<Eigen::Index>(i)];
       starting[i] = {speed, speed * speed};
     }
     const RotorLoads loads = calc_rotor_loads(motion, starting);
-    const double tension = calc_accelerations(find_rotations(motion), loads).tension;
+    const double tension = calc_accelerations(motion, find_rotations(motion), loads).tension;
 
-    model::Numbers signals = drive.calc_signals(loads.thrust);
+    model::Numbers signals = drive.calc_signals(loads.thrust, step);
     signals.conservativeResize(signals.size() + 1);
     signals[signals.size() - 1] = tension;
     return signals;
@@ -296,6 +327,8 @@ struct MultirotorPlant::Multibody {
 
   const MultirotorKeys keys;
   const config::Plant config;
+  const Air air;
+  Vector3d quad_wind_W, load_wind_W;  ///< held over a step, m/s
   const model::SlungLoadParameters vehicle;
   RotorDrive drive;
   const double step_s;
@@ -336,6 +369,7 @@ const model::Measurement& MultirotorPlant::measurement(std::size_t) const {
 std::vector<Signal> MultirotorPlant::signals() const {
   std::vector<Signal> signals = multibody_->drive.list_signals();
   signals.push_back({"rod_tension_n", "N"});
+  multibody_->air.list_signals(signals);
   return signals;
 }
 

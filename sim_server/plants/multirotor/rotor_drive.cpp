@@ -29,7 +29,11 @@ RotorDrive::RotorDrive(const AirframeKeys& keys, const PlantSetup& setup, std::s
       step_s_(1e-9 * static_cast<double>(setup.plant.step_ns)),
       attitude_error_(model::turn(Eigen::Quaterniond::Identity(), setup.estimator.attitude)),
       watch_(rotors_.size(), setup.plant.step_ns) {
-  for (const FlyingRotor& rotor : rotors_) lags_.emplace_back(rotor, step_s_);
+  for (const FlyingRotor& rotor : rotors_) {
+    lags_.emplace_back(rotor, step_s_);
+    own_scales_.push_back(rotor.thrust_scale);
+  }
+  if (ThrustSource::acts(setup)) source_.emplace(setup, vehicle);
   AutopilotSetup given{setup.autopilot, setup.folder, setup.vehicles[vehicle].id,
                        setup.vehicles[vehicle].parameters, airframe_};
   if (given.autopilot.period_ns == 0) given.autopilot.period_ns = setup.plant.step_ns;
@@ -44,6 +48,24 @@ void RotorDrive::start(double thrust) {
   state_.set_points = state_.output.rotor_speeds;
   limit(state_.set_points);
   state_.speeds = state_.set_points;
+}
+
+void RotorDrive::set_state(const State& state) {
+  state_ = state;
+  if (source_) source_->set_charge(state.charge);
+}
+
+/// What the rotors lack in the step that begins, and what they take from the battery.
+void RotorDrive::scale_thrusts(std::int64_t step) {
+  const double scale = source_->calc_scale(step);
+  double thrust = 0.0;
+  for (std::size_t i = 0; i < rotors_.size(); ++i) {
+    rotors_[i].thrust_scale = scale * source_->calc_rotor_scale(step, i) * own_scales_[i];
+    const double speed = state_.speeds[static_cast<Eigen::Index>(i)];
+    thrust += calc_thrust(rotors_[i], {speed, speed * speed}, 0.0);
+  }
+  source_->discharge(thrust);
+  state_.charge = source_->charge();
 }
 
 /// Clamps speeds to the limits of the rotors.
@@ -75,6 +97,7 @@ void RotorDrive::step(const Vector3d& f_Q_W, const Vector3d& v_WQ, const model::
     }
     if (output.direction_W) output.direction_W = attitude_error_.conjugate() * *output.direction_W;
   }
+  if (source_) scale_thrusts(step);
   watch_.look(rotors_, output.rotor_speeds, step, step_s_);
 }
 
@@ -113,14 +136,16 @@ std::vector<Signal> RotorDrive::list_signals() const {
   for (const char* name : {"att_set_w", "att_set_x", "att_set_y", "att_set_z"})
     signals.push_back({name, "1"});
   for (const char* name : {"thrust_set_n", "thrust_n"}) signals.push_back({name, "N"});
+  if (source_) source_->list_signals(signals);
   return signals;
 }
 
-model::Numbers RotorDrive::calc_signals(double thrust) const {
+model::Numbers RotorDrive::calc_signals(double thrust, std::int64_t step) const {
   model::Numbers signals(2 * state_.speeds.size() + 6);
   const Eigen::Quaterniond& q = state_.output.q_WB;
   signals << state_.speeds, state_.set_points, q.w(), q.x(), q.y(), q.z(), state_.output.thrust,
       thrust;
+  if (source_) source_->add_signals(step, signals);
   return signals;
 }
 

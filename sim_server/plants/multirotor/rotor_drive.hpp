@@ -15,6 +15,7 @@
 #include "sim_server/plants/multirotor/rotor_model.hpp"
 #include "sim_server/plants/multirotor/saturation_watch.hpp"
 #include "sim_server/plants/plant.hpp"
+#include "sim_server/plants/thrust/thrust_source.hpp"
 
 namespace sls::sim {
 
@@ -25,6 +26,7 @@ class RotorDrive {
     AutopilotOutput output;      ///< the last one; its direction is in the plant's W
     Eigen::VectorXd set_points;  ///< of the rotors, within their limits, rad/s
     Eigen::VectorXd speeds;      ///< rad/s
+    double charge = 1.0;         ///< of the battery
   };
 
   /// The rotors of `setup.vehicles[vehicle]`.
@@ -34,7 +36,7 @@ class RotorDrive {
   const Airframe& airframe() const { return airframe_; }
   std::size_t size() const { return rotors_.size(); }
   const State& state() const { return state_; }
-  void set_state(const State& state) { state_ = state; }
+  void set_state(const State& state);
   void set_speed(std::size_t rotor, double speed) {
     state_.speeds[static_cast<Eigen::Index>(rotor)] = speed;
   }
@@ -62,15 +64,18 @@ class RotorDrive {
 
   /// Speeds, set-points, attitude set-point, thrust: of the set-point, and `thrust` (N).
   std::vector<Signal> list_signals() const;
-  model::Numbers calc_signals(double thrust) const;
+  model::Numbers calc_signals(double thrust, std::int64_t step) const;
 
   std::vector<std::string> take_remarks() { return watch_.take_remarks(); }
 
  private:
   void limit(Eigen::VectorXd& wanted) const;
+  void scale_thrusts(std::int64_t step);
 
   const Airframe airframe_;
-  const std::vector<FlyingRotor> rotors_;
+  std::vector<FlyingRotor> rotors_;  // with the scales of their thrusts in the step
+  std::vector<double> own_scales_;   // of the rotors, constant
+  std::optional<ThrustSource> source_;
   const double step_s_;
   const Eigen::Quaterniond attitude_error_;  // estimated attitude = this × true one
   std::vector<RotorLag> lags_;               // of the rotors, over a plant step

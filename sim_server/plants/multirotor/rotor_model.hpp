@@ -77,7 +77,7 @@ class RotorLag {
 
 /// Thrust of a rotor (N). The air passes along its axis with `axial_speed` (m/s, either sign).
 inline double calc_thrust(const FlyingRotor& rotor, const RotorSpeed& turning, double axial_speed) {
-  const double thrust = rotor.thrust_constant * turning.square;
+  const double thrust = rotor.thrust_scale * (rotor.thrust_constant * turning.square);
   if (rotor.thrust_loss_speed == 0.0) return thrust;
   return thrust * std::max(0.0, 1.0 - std::abs(axial_speed) / rotor.thrust_loss_speed);
 }

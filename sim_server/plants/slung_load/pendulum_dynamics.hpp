@@ -34,14 +34,26 @@ class PendulumDynamics {
   /// pendulum's angular velocity in W, axes of L, rad/s.
   Accelerations calc_accelerations(const SimTK::Rotation& R_WL, const SimTK::Vec3& w_L,
                                    const SimTK::Vec3& force_W) const {
-    const SimTK::Vec3 torque_L =
-        (~R_WL * force_W) % p_QC_L_ - w_L % inertia_C_.elementwiseMultiply(w_L);
+    return move(R_WL, w_L, force_W, (~R_WL * force_W) % p_QC_L_);
+  }
+  /// The same with a force `on_load_W` (N) at the place `p_QL_L` of the pendulum, m.
+  Accelerations calc_accelerations(const SimTK::Rotation& R_WL, const SimTK::Vec3& w_L,
+                                   const SimTK::Vec3& force_W, const SimTK::Vec3& on_load_W,
+                                   const SimTK::Vec3& p_QL_L) const {
+    return move(R_WL, w_L, force_W + on_load_W,
+                (~R_WL * force_W) % p_QC_L_ + (p_QL_L - p_QC_L_) % (~R_WL * on_load_W));
+  }
+
+ private:
+  /// `moment_L` is that of all forces about C.
+  Accelerations move(const SimTK::Rotation& R_WL, const SimTK::Vec3& w_L,
+                     const SimTK::Vec3& force_W, const SimTK::Vec3& moment_L) const {
+    const SimTK::Vec3 torque_L = moment_L - w_L % inertia_C_.elementwiseMultiply(w_L);
     const SimTK::Vec3 b_L = inverse_inertia_C_.elementwiseMultiply(torque_L);
     const SimTK::Vec3 a_QC_L = b_L % p_QC_L_ + w_L % (w_L % p_QC_L_);
     return {gravity_W_ + force_W / mass_ - R_WL * a_QC_L, b_L};
   }
 
- private:
   const SimTK::Vec3 gravity_W_;    // m/s²
   const double mass_;              // of both, kg
   SimTK::Vec3 p_QC_L_;             // a of eq. (3), m

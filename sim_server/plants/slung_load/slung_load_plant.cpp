@@ -6,6 +6,7 @@
 #include <cstdint>
 
 #include "common/model/forces.hpp"
+#include "sim_server/plants/air/air.hpp"
 #include "sim_server/plants/rod_frame.hpp"
 #include "sim_server/plants/slung_load/keys.hpp"
 #include "sim_server/plants/slung_load/pendulum_dynamics.hpp"
@@ -90,6 +91,9 @@ void check_finite(const Motion& motion, std::int64_t step) {
 struct SlungLoadPlant::Multibody {
   Multibody(const model::SlungLoadParameters& vehicle, const config::Plant& plant)
       : config(plant),
+        air(plant),
+        quad_air(plant.air),
+        load_wind_W(plant.air.v_wind_W),
         step_s(1e-9 * static_cast<double>(plant.step_ns)),
         has_speeds_in_L(plant.own.get<SlungLoadKeys>().pendulum == Pendulum::kIdeal),
         matter(system),
@@ -100,7 +104,7 @@ struct SlungLoadPlant::Multibody {
                  vehicle.gravity),
         p_QL_L(0, 0, vehicle.rod_length) {
     place(plant.initial, vehicle.rod_length);
-    held = calc_finite_state(0);
+    held = measure(0);
   }
 
   static SimTK::State make_state(SimTK::MultibodySystem& system) {
@@ -149,9 +153,15 @@ struct SlungLoadPlant::Multibody {
     const SimTK::Vec3 w_W = has_speeds_in_L ? R_WL * at.rod_speeds : at.rod_speeds;
 
     Eigen::Vector3d force = f_Q_W + config.disturbance_W;
-    if (config.air.rotor_drag != 0.0)
-      force += model::calc_rotor_drag(f_Q_W, to_eigen(at.v_WQ), config.air);
-    const auto [a_WQ, b_L] = dynamics.calc_accelerations(R_WL, w_L, to_simtk(force));
+    if (quad_air.rotor_drag != 0.0)
+      force += model::calc_rotor_drag(f_Q_W, to_eigen(at.v_WQ), quad_air);
+    const auto [a_WQ, b_L] = air.drags_load()
+                                 ? dynamics.calc_accelerations(
+                                       R_WL, w_L, to_simtk(force),
+                                       to_simtk(air.calc_load_drag(
+                                           to_eigen(at.v_WQ + w_W % (R_WL * p_QL_L)), load_wind_W)),
+                                       p_QL_L)
+                                 : dynamics.calc_accelerations(R_WL, w_L, to_simtk(force));
 
     return {at.v_WQ, SimTK::Rotation::convertAngVelToQuaternionDot(at.rod, w_W), a_WQ,
             has_speeds_in_L ? b_L : R_WL * b_L};
@@ -166,6 +176,7 @@ struct SlungLoadPlant::Multibody {
       realize_positions(there);
       return calc_rate(there, f_Q_W);
     };
+    if (air.varies()) hold_wind(start, step - 1);
     const Motion k1 = calc_rate(start, f_Q_W);
     const Motion k2 = calc_rate_at(add(start, h / 2, k1));
     const Motion k3 = calc_rate_at(add(start, h / 2, k2));
@@ -177,6 +188,17 @@ struct SlungLoadPlant::Multibody {
     return next;
   }
 
+  /// The wind over the step after `step`, whose motion is `at`.
+  void hold_wind(const Motion& at, std::int64_t step) {
+    const double start = static_cast<double>(step) * step_s;
+    const SimTK::Rotation& R_WL = pendulum.getBodyRotation(state);
+    const SimTK::Vec3 w_W = has_speeds_in_L ? R_WL * at.rod_speeds : at.rod_speeds;
+    const SimTK::Vec3 p_QL_W = R_WL * p_QL_L;
+    quad_air.v_wind_W = air.calc_held_wind(start, step_s, to_eigen(at.p_WQ), to_eigen(at.v_WQ));
+    load_wind_W = air.calc_held_wind(start, step_s, to_eigen(at.p_WQ + p_QL_W),
+                                     to_eigen(at.v_WQ + w_W % p_QL_W));
+  }
+
   /// If one of the steps throws, nothing changes.
   void advance(const Eigen::Vector3d& f_Q_W, std::int64_t count) {
     check_finite(f_Q_W, steps, "force_x_n", "force_y_n", "force_z_n");
@@ -184,7 +206,7 @@ struct SlungLoadPlant::Multibody {
       Motion next = motion;
       for (std::int64_t i = 1; i <= count; ++i) next = calc_next(next, f_Q_W, steps + i);
       realize_velocities(next);
-      static_cast<model::SlungLoadState&>(held) = calc_finite_state(steps + count);
+      held = measure(steps + count);
       motion = next;
     } catch (...) {
       realize_positions(motion);
@@ -193,17 +215,21 @@ struct SlungLoadPlant::Multibody {
     steps += count;
   }
 
-  model::SlungLoadState calc_finite_state(std::int64_t step) const {
+  model::Measurement measure(std::int64_t step) const {
     SimTK::Vec3 p_WL, v_WL;
     pendulum.findStationLocationAndVelocityInGround(state, p_QL_L, p_WL, v_WL);
-    const model::SlungLoadState result = model::make_state(
-        to_eigen(quadrotor.getBodyOriginLocation(state)),
-        to_eigen(quadrotor.getBodyOriginVelocity(state)), to_eigen(p_WL), to_eigen(v_WL));
-    check_finite(result, step);
+    model::Measurement result(model::make_state(to_eigen(quadrotor.getBodyOriginLocation(state)),
+                                                to_eigen(quadrotor.getBodyOriginVelocity(state)),
+                                                to_eigen(p_WL), to_eigen(v_WL)));
+    sim::check_finite(result, step);
+    air.add_signals(static_cast<double>(step) * step_s, result);
     return result;
   }
 
   const config::Plant config;
+  const Air air;
+  model::Aerodynamics quad_air;  ///< with the wind held over a step
+  Eigen::Vector3d load_wind_W;   ///< held over a step, m/s
   const double step_s;
   const bool has_speeds_in_L;
   std::int64_t steps = 0;
@@ -237,6 +263,12 @@ void SlungLoadPlant::advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int
 
 const model::Measurement& SlungLoadPlant::measurement(std::size_t) const {
   return multibody_->held;
+}
+
+std::vector<Signal> SlungLoadPlant::signals() const {
+  std::vector<Signal> signals;
+  multibody_->air.list_signals(signals);
+  return signals;
 }
 
 PlantType slung_load_type() {

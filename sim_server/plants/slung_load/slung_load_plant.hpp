@@ -30,6 +30,7 @@ class SlungLoadPlant : public Plant {
 
   void advance(const std::vector<Eigen::Vector3d>& f_Q_W, std::int64_t steps) override;
   const model::Measurement& measurement(std::size_t) const override;
+  std::vector<Signal> signals() const override;
 
  private:
   struct Multibody;

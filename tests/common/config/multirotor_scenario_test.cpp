@@ -26,8 +26,8 @@ Scenario make_every_key() {
   const sim::RotorNumbers<std::optional<double>> own{5.2e-6, 0.06,  9e-5,  2e-6, 110,
                                                      1600,   0.013, 0.026, 26};
   keys.rotors = {
-      {Vector3d(0.13, 0.22, -0.01), Vector3d(0.1, 0, -2), sim::Spin::kCounterClockwise, {}},
-      {Vector3d(-0.13, -0.2, 0), -Vector3d::UnitZ(), sim::Spin::kClockwise, own}};
+      {Vector3d(0.13, 0.22, -0.01), Vector3d(0.1, 0, -2), sim::Spin::kCounterClockwise, 1.0, {}},
+      {Vector3d(-0.13, -0.2, 0), -Vector3d::UnitZ(), sim::Spin::kClockwise, 0.9, own}};
   keys.bodies.resize(2);
   keys.bodies[0] = {0.03, Vector3d(0.01, 0.02, 0.03), Vector3d(1e-4, 2e-4, 2.5e-4)};
   keys.bodies[1].mass = 0.005;

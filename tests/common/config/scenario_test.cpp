@@ -44,7 +44,7 @@ TEST(ScenarioTest, WarnsOfWhatIsAllowedButHardlyMeant) {
   EXPECT_EQ(parse_scenario(text, "file").warnings,
             (std::vector<std::string>{"file:5: plant.step_s: expected at most 0.007501 for a swing "
                                       "of 33.3 rad/s, got 0.01: the swing loses energy"}));
-  text = read_file("config/scenarios/lift_and_set_down.yaml");
+  text = read_bytes(SLS_SOURCE_DIR "/config/scenarios/lift_and_set_down.yaml");
   text = replace_once(text, "retaut_rate_m_s: 2", "retaut_rate_m_s: 0.5");
   EXPECT_EQ(parse_scenario(text, "file").warnings,
             (std::vector<std::string>{
@@ -57,7 +57,7 @@ Scenario make_every_key() {
   Scenario scenario;
   scenario.name = "every_key";
   scenario.vehicle = {1.6, 0.16, 0.7, 10.0};
-  scenario.vehicles = {{Vector3d(1, 2, 3), 1.8, 0.18, 0.9}, {}};
+  scenario.vehicles = {{Vector3d(1, 2, 3), 1.8, 0.18, 0.9, 0.95, Vector3d(0.3, 0.2, 0.1), {}, {}}, {}};
 
   Plant& plant = scenario.plant;
   plant.own = sim::SlungLoadKeys{sim::Pendulum::kIdeal};
@@ -67,6 +67,12 @@ Scenario make_every_key() {
   plant.initial.v_WQ << 0.1, 0.2, 0.3;
   plant.initial.rod = {0.4, -0.5, 0.6, -0.7};
   plant.air = {0.3, Vector3d(2, -1, 0.5)};
+  plant.wind.gusts = {{3'000'000'000, 500'000'000, 2'000'000'000, Vector3d(1, 0, -1)},
+                      {4'000'000'000, 0, {}, Vector3d(0, 1, 0)}};
+  plant.wind.turbulence = Turbulence{20.0, 7.7, 5};
+  plant.load_drag = {0.1, 0.02, 1.1};
+  plant.thrust = {0.925, -0.001, Battery{16.8, 14.0, 0.02, 5.0, 250.0},
+                  {{2'000'000'000, 1, {}, 0.5}, {3'000'000'000, 0, {}, 0.0}}};
   plant.disturbance_W << 0.1, 0, -0.1;
 
   scenario.sync = {SyncMode::kRealtime, 2'000'000, 2.5, 0.25, 0.75, {2, 0, 7.5}, {}};

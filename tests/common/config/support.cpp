@@ -25,7 +25,8 @@ const char* const kEveryKey = R"(
 name: every_key
 vehicle: { quad_mass_kg: 1.6, load_mass_kg: 0.16, rod_length_m: 0.7, gravity_m_s2: 10 }
 vehicles:
-  - { offset_m: [1, 2, 3], quad_mass_kg: 1.8, load_mass_kg: 0.18, rod_length_m: 0.9 }
+  - { offset_m: [1, 2, 3], quad_mass_kg: 1.8, load_mass_kg: 0.18, rod_length_m: 0.9, thrust_scale: 0.95,
+      quad_velocity_m_s: [0.3, 0.2, 0.1] }
   - {}
 plant:
   pendulum: ideal
@@ -39,6 +40,15 @@ plant:
     beta_dot_rad_s: -0.7
   rotor_drag_n_s_m: 0.3
   wind_m_s: [2, -1, 0.5]
+  wind:
+    gusts: [{ at_s: 3, rise_s: 0.5, for_s: 2, wind_m_s: [1, 0, -1] }, { at_s: 4, wind_m_s: [0, 1, 0] }]
+    turbulence: { altitude_m: 20, w20_m_s: 7.7, seed: 5 }
+  thrust:
+    scale: 0.925
+    drift_per_s: -0.001
+    battery: { full_v: 16.8, empty_v: 14, resistance_ohm: 0.02, capacity_ah: 5, hover_power_w: 250 }
+    failures: [{ at_s: 2, vehicle: 1, thrust_scale: 0.5 }, { at_s: 3 }]
+  load_drag: { linear_n_s_m: 0.1, area_m2: 0.02, air_density_kg_m3: 1.1 }
   disturbance_n: [0.1, 0, -0.1]
 sync:
   mode: realtime
@@ -111,6 +121,7 @@ plant:
     - { position_m: [0.13, 0.22, -0.01], spin: ccw, axis: [0.1, 0, -2] }
     - position_m: [-0.13, -0.2, 0]
       spin: cw
+      thrust_scale: 0.9
       thrust_constant_n_s2: 5.2e-6
       torque_constant_m: 0.06
       drag_constant_n_s2_m: 9.0e-5

@@ -76,6 +76,48 @@ TEST(CablesPlantTest, AnAttitudeTurnsTheLoadAboutTheEndsThatTheVehiclesPlace) {
   EXPECT_LE((plant->measurement(1).v_WQ - Vector3d(1.3, 0.0, 0.0)).norm(), 1e-14);
 }
 
+TEST(CablesPlantTest, AFlightGoesOnFromAnInstantOfAnother) {
+  config::Scenario scenario = make_bar();
+  auto& keys = scenario.plant.own.edit<CablesKeys>();
+  keys.cables[0].beta = -0.4;
+  keys.cables[1].beta = 0.3;
+  keys.load_rates = {0.1, -0.2, 0.5};
+  scenario.plant.initial.v_WQ = {0.5, -0.2, 0.1};
+  const auto first = make(scenario);
+  const auto force = [](int k) {
+    return std::vector<Vector3d>{{0.3, 0.1 * std::sin(0.01 * k), -6.0}, {-0.2, 0.0, -5.8}};
+  };
+  for (int k = 0; k < 300; ++k) first->advance(force(k), 1);
+
+  const model::Numbers& signals = first->measurement(0).signals;  // from 3 on: the load's attitude
+  keys.load_attitude = Eigen::Quaterniond(signals[3], signals[4], signals[5], signals[6]);
+  keys.load_rates = signals.segment<3>(7);
+  const Eigen::Matrix3d R = keys.load_attitude->toRotationMatrix();
+  const Vector3d centre = first->measurement(0).p_WL - R * keys.cables[0].attachment;
+  for (const std::size_t i : {0, 1}) {
+    const model::Measurement& at = first->measurement(i);
+    ASSERT_EQ(at.signals[2], 1.0);
+    scenario.vehicles[i].v_WQ = at.v_WQ;
+    scenario.vehicles[i].offset = centre + R * keys.cables[i].attachment;
+    keys.cables[i].alpha = at.rod.alpha;
+    keys.cables[i].beta = at.rod.beta;
+  }
+  scenario.plant.initial.position.setZero();
+  keys.cables[0].alpha_dot = first->measurement(0).rod.alpha_dot;
+  keys.cables[0].beta_dot = first->measurement(0).rod.beta_dot;
+  const auto second = make(scenario);
+  for (int k = 300; k < 800; ++k) {
+    first->advance(force(k), 1);
+    second->advance(force(k), 1);
+  }
+  for (const std::size_t i : {0, 1}) {
+    const model::Measurement &one = first->measurement(i), &other = second->measurement(i);
+    EXPECT_LE((one.p_WQ - other.p_WQ).norm(), 1e-12);
+    EXPECT_LE((one.v_WL - other.v_WL).norm(), 1e-11);
+    EXPECT_EQ(one.signals[2], other.signals[2]);
+  }
+}
+
 TEST(CablesPlantTest, SharesHangOnTheirCablesAndADropIsReported) {
   config::Scenario scenario = make_bar();
   scenario.vehicles[1].quad_mass = 0.7;

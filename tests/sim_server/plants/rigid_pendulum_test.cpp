@@ -73,8 +73,8 @@ TEST(RigidPendulumTest, FollowsTheNewtonEulerEquationsForThirtyTwoSeconds) {
     tilt = std::max(tilt, calc_tilt(expected.n_W));
   }
   EXPECT_GT(tilt, 20.0 * M_PI / 180.0);
-  // The plant's truncation error is (ωh)⁴/120 = 1e-12 per radian. The errors are 5.18e-11 to 5.21e-11
-  // and 1.19e-10: the force here comes from the C library's functions.
+  // The plant's truncation error is (ωh)⁴/120 = 1e-12 per radian. The errors are 5.18e-11
+  // to 5.21e-11 and 1.19e-10: the force here comes from the C library's functions.
   EXPECT_LE(position_error, 5.3e-11);
   EXPECT_LE(velocity_error, 1.2e-10);
 }
