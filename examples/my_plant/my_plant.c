@@ -9,7 +9,7 @@
 #include <string.h>
 
 enum { kStiffness, kDamping, kParameters };
-static const char* const kNames[] = {"stiffness_n_m", "damping_n_s_m"};
+static const char* const kNames[] = {"stiffness_n_per_m", "damping_n_s_m"};
 
 /* Positions (m) and velocities (m/s) of quadrotor and load, in the world frame. */
 typedef struct {
@@ -23,7 +23,7 @@ typedef struct {
   Motion motion;
 } Plant;
 
-/* Reads {"stiffness_n_m": 2000, …} into `k`. Returns 0 and writes `error` if it cannot. */
+/* Reads {"stiffness_n_per_m": 2000, …} into `k`. Returns 0 and writes `error` if it cannot. */
 static int read_parameters(const char* json, double* k, char* error, size_t error_size) {
   char* end;
   locale_t c = newlocale(LC_ALL_MASK, "C", NULL); /* the process may have a decimal comma */
@@ -34,7 +34,7 @@ static int read_parameters(const char* json, double* k, char* error, size_t erro
     int i = 0;
     while (i < kParameters && (strncmp(kNames[i], name, (size_t)length) || kNames[i][length])) ++i;
     if (i == kParameters) {
-      snprintf(error, error_size, "expected stiffness_n_m or damping_n_s_m, got %.*s", length,
+      snprintf(error, error_size, "expected stiffness_n_per_m or damping_n_s_m, got %.*s", length,
                name);
       return 0;
     }

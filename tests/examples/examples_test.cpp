@@ -90,8 +90,8 @@ TEST(ExamplesTest, AreInstalledBuiltAndFlownAsByAUser) {
                  "position, velocity, integral, rod_angle, rod_rate or filter_s");
   expect_exit({"ctest", "--test-dir", installation.example("my_controller") / "build"});
   expect_same_flight(installation, "my_plant");
-  expect_refused(installation, "my_plant", "stiffness_n_m", "plant", 6,
-                 "stiffness_n_m or damping_n_s_m");
+  expect_refused(installation, "my_plant", "stiffness_n_per_m", "plant", 6,
+                 "stiffness_n_per_m or damping_n_s_m");
   const fs::path turned = expect_same_flight(installation, "my_autopilot");
   EXPECT_EQ(read_manifest(turned).at("libraries").at("plant").get<std::string>(),
             text::calc_file_sha256(installation.example("my_autopilot") / "build/my_autopilot.so"));

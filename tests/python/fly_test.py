@@ -211,7 +211,7 @@ def test_a_decimal_comma_changes_no_flight(tmp_path, monkeypatch, flag):
     source = ROOT / "examples/my_plant/my_plant.c"
     subprocess.run(["cc", "-shared", "-fPIC", flag, f"-I{tmp_path}", source, "-o", plant], check=True)
     scenario = sls.load_scenario("short", plant={
-        "model": str(plant), "parameters": {"stiffness_n_m": 2000.5}, "initial": {"load_position_m": [0, 0, -0.5]}})
+        "model": str(plant), "parameters": {"stiffness_n_per_m": 2000.5}, "initial": {"load_position_m": [0, 0, -0.5]}})
 
     def fly(name):
         sls.fly("aggressive_slack").save(tmp_path / name)

@@ -93,7 +93,7 @@ def read_launcher(build):
 UNITS = {
     "kg_m2": "kg·m²", "kg": "kg", "m_s2": "m/s²", "m_s": "m/s", "m": "m", "per_rad_s2": "s²/rad", "per_rad_s": "s/rad",
     "per_rad": "1/rad", "per_s": "1/s", "rad_s": "rad/s", "rad": "rad", "s": "s", "hz": "Hz", "n_s_m": "N·s/m",
-    "m2": "m²", "kg_m3": "kg/m³", "v": "V", "ohm": "Ω", "ah": "A·h", "w": "W", "n_s2_m": "N·s²/m", "n_s2": "N·s²", "n_m_s": "N·m·s", "n_m": "N·m", "n": "N",
+    "m2": "m²", "kg_m3": "kg/m³", "v": "V", "ohm": "Ω", "ah": "A·h", "w": "W", "n_s2_m": "N·s²/m", "n_s2": "N·s²", "n_m_s": "N·m·s", "n_m": "N·m", "n_per_m": "N/m", "n": "N",
 }  # fmt: skip
 
 

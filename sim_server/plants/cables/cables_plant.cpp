@@ -99,6 +99,7 @@ void CablesPlant::plan(const CablesKeys& keys) {
         length = stage.length;
       }
     }
+    has_stretch_ |= cable.stiffness.has_value();
     if (cable.release_ns) {
       has_release_ = true;
       changes_.push_back({1e-9 * static_cast<double>(*cable.release_ns), i, {}, "cable released"});
@@ -220,6 +221,10 @@ model::Measurement CablesPlant::measure(std::size_t vehicle) const {
   if (has_release_) add(motion_.is_cut(vehicle));
   if (system_.ground_z_W)
     for (const std::size_t body : {cables::kLoad, vehicle}) add(motion_.standing().has(body));
+  if (has_stretch_) {
+    const bool is_longer = !motion_.is_cut(vehicle) && distance > own.length;
+    add(is_longer ? distance - own.length : 0.0);
+  }
   if (rotors_) {
     measured.attitude = cables::to_attitude(motion.turns[vehicle]);
     for (const double number : rotors_->calc_signals(vehicle, motion_, steps_)) add(number);
@@ -245,6 +250,7 @@ std::vector<Signal> CablesPlant::list_signals() const {
   if (has_release_) signals.push_back({"cable_released", ""});
   if (system_.ground_z_W)
     for (const char* name : {"load_on_ground", "vehicle_on_ground"}) signals.push_back({name, ""});
+  if (has_stretch_) signals.push_back({"cable_stretch_m", "m"});
   if (rotors_)
     for (const Signal& signal : rotors_->of(0).list_signals()) signals.push_back(signal);
   return signals;
@@ -271,6 +277,8 @@ void CablesPlant::note(const cables::Event& event) {
     case Kind::kLiftOff:
       return remark(vehicle, Topic::kGround, body + " lifts off" + time);
     case Kind::kTaut: {
+      if (system_.stiffness[vehicle] > 0.0)  // without an impact
+        return remark(vehicle, Topic::kCable, "cable taut" + time);
       char impulse[32];
       const auto end = std::to_chars(impulse, impulse + sizeof impulse, event.impulse,
                                      std::chars_format::general, 6);

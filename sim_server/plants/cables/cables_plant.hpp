@@ -69,7 +69,7 @@ class CablesPlant : public Plant {
   std::vector<Change> changes_;  // by time
   std::size_t next_change_ = 0;
   std::vector<std::optional<cables::WinchPhase>> phases_;  // that hold now, of each cable
-  bool has_winch_ = false, has_release_ = false;           // any cable
+  bool has_winch_ = false, has_release_ = false, has_stretch_ = false;  // any cable
   std::vector<Signal> signals_;
   Eigen::Index own_signals_;           // those before the signals of the air
   std::vector<cables::Event> events_;  // of one step; a member to avoid allocation

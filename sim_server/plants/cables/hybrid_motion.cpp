@@ -132,6 +132,13 @@ double calc_energy_scale(const System& system, const Motion& motion) {
   return mass * std::max(system.gravity, 1.0) * length;
 }
 
+Members find_stiff(const System& system) {
+  Members stiff;
+  for (std::size_t i = 0; i < system.count; ++i)
+    if (!(system.stiffness[i] > 0.0)) stiff.add(i);
+  return stiff;
+}
+
 }  // namespace
 
 struct HybridMotion::Found {
@@ -139,10 +146,15 @@ struct HybridMotion::Found {
   Limit limit;
 };
 
+Members HybridMotion::Mode::get_pulling() const {
+  return stretched.empty() ? taut : unite(taut, stretched);
+}
+
 HybridMotion::HybridMotion(const System& system, const Motion& start)
     : system_(system),
       held_(system),
       uncut_(Members::all(system.count)),
+      stiff_(find_stiff(system)),
       bodies_(find_bodies(system)),
       inverse_energy_scale_(1.0 / calc_energy_scale(system, start)) {
   now().tension.fill(0.0);
@@ -158,7 +170,9 @@ HybridMotion::HybridMotion(const System& system, const Motion& start)
   calc_geometry(system_, now().motion, uncut_, now().geometry);
   // Ends that move apart at the length meet now; the others of these cables do not.
   mode_.taut = find_moving(
-      find_candidates(uncut_, now().geometry, kLengthTolerance, kLengthTolerance), landing);
+      find_candidates(stiff_, now().geometry, kLengthTolerance, kLengthTolerance), landing);
+  for (const std::size_t i : uncut_)
+    if (stretches(i) && calc_spring_stretch(now(), i) > 0.0) mode_.stretched.add(i);
   put_on_ground(landing);
   place(mode_.taut, now());
   const bool meets = std::any_of(mode_.taut.begin(), mode_.taut.end(), [&](std::size_t i) {
@@ -173,7 +187,8 @@ HybridMotion::HybridMotion(const System& system, const Motion& start)
 }
 
 bool HybridMotion::holds(const Limit& limit) const {
-  return (limit.of == Limit::Of::kCable ? mode_.taut : mode_.standing).has(limit.index);
+  if (limit.of == Limit::Of::kBody) return mode_.standing.has(limit.index);
+  return mode_.taut.has(limit.index) || mode_.stretched.has(limit.index);
 }
 
 /// How far something is beyond its limit, m.
@@ -208,7 +223,7 @@ Members HybridMotion::find_touching(const Instant& instant) const {
   const double least = -kTouching * (1.0 + place), rounding = kTouching * (1.0 + speed);
   const Geometry& geometry = instant.geometry;
   Members touching;
-  for (const std::size_t i : uncut_)
+  for (const std::size_t i : stiff_)
     if (geometry.stretch[i] >= least && std::abs(geometry.stretch_rate[i]) <= rounding)
       touching.add(i);
   return find_moving(touching, mode_.standing);
@@ -225,10 +240,11 @@ const Actions& HybridMotion::act(const Actions& actions, const Instant& instant)
 void HybridMotion::pull(const Actions& held, Instant& instant) const {
   const Actions& actions = act(held, instant);
   calc_free_rate(held_, instant.motion, actions, instant.rate);
+  instant.tension.fill(0.0);
+  add_springs(held_, instant.geometry, mode_.stretched, instant.tension, instant.rate);
   Vector offset;
   calc_offset(held_, instant.motion, instant.geometry, actions, instant.rate, mode_.taut, offset);
   for (const std::size_t i : mode_.taut) offset[i] = -offset[i];
-  instant.tension.fill(0.0);
   instant.factor.solve(offset, instant.tension);
   add_pulls(held_, instant.geometry, instant.tension, mode_.taut, instant.rate);
   if (!mode_.standing.empty()) support(actions, instant);
@@ -240,12 +256,13 @@ void HybridMotion::support(const Actions& actions, Instant& instant) const {
     double& force = instant.ground[body];
     if (body == kLoad) {
       force = system_.load_mass * system_.gravity;
-      for (const std::size_t i : mode_.taut)
+      for (const std::size_t i : mode_.get_pulling())
         force -= instant.tension[i] * instant.geometry.n_W[i].z();
     } else {
       force = system_.vehicle_mass[body] * system_.gravity +
               calc_force(actions, instant.motion.vehicles[body], body).z();
-      if (mode_.taut.has(body)) force += instant.tension[body] * instant.geometry.n_W[body].z();
+      if (mode_.get_pulling().has(body))
+        force += instant.tension[body] * instant.geometry.n_W[body].z();
     }
   }
 }
@@ -306,10 +323,11 @@ double HybridMotion::calc_lift(const Actions& actions, const Instant& instant,
   Geometry geometry;
   calc_geometry(freed, instant.motion, uncut_, geometry);
   const Members candidates = find_moving(
-      unite(find_candidates(uncut_, geometry, kLengthTolerance, kLengthTolerance), mode_.taut),
+      unite(find_candidates(stiff_, geometry, kLengthTolerance, kLengthTolerance), mode_.taut),
       standing);
-  const Motion rate =
-      calc_accelerations(freed, instant.motion, geometry, act(actions, instant), candidates).rate;
+  const Motion rate = calc_accelerations(freed, instant.motion, geometry, act(actions, instant),
+                                         candidates, mode_.stretched)
+                          .rate;
   // A rate holds accelerations where a motion holds velocities.
   return std::min(pulled, get_mass(system_, body) * -get_fall(rate, body));
 }
@@ -323,8 +341,8 @@ void HybridMotion::keep(const Actions& actions, const Members& cables) {
 
 /// Which of the `candidates` are taut from now on, with the standing bodies still.
 void HybridMotion::solve(const Actions& actions, const Members& candidates) {
-  const Accelerations result =
-      calc_accelerations(held_, now().motion, now().geometry, act(actions, now()), candidates);
+  const Accelerations result = calc_accelerations(held_, now().motion, now().geometry,
+                                                  act(actions, now()), candidates, mode_.stretched);
   now().rate = result.rate;
   now().tension = result.tension;
   mode_.taut = result.taut;
@@ -400,9 +418,10 @@ void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
     if (does_work_vary_) power += weight * calc_power(system_, at.motion, at.rate);
   };
   add_power(1.0, now());
+  const Members pulling = mode_.get_pulling();
   const auto calc_stage = [&](double share, const Motion& rate) {
     add(system_, now().motion, share * h, rate, stage.motion);
-    calc_geometry(held_, stage.motion, mode_.taut, stage.geometry);
+    calc_geometry(held_, stage.motion, pulling, stage.geometry);
     hold(mode_.taut, stage);
     pull(actions, stage);
   };
@@ -518,6 +537,40 @@ std::optional<double> HybridMotion::find_arrival(const Actions& actions, double 
   return find_crossing(violation, 0.0, start, until, at_end);
 }
 
+/// How far a cable that stretches pulls, as a length: > 0 where (19) has a tension.
+double HybridMotion::calc_spring_stretch(const Instant& instant, std::size_t cable) const {
+  const double stretch = instant.geometry.stretch[cable];
+  const double late = system_.damping[cable] / system_.stiffness[cable];
+  return std::min(stretch, stretch + late * instant.geometry.stretch_rate[cable]);
+}
+
+/// When a cable that stretches begins to pull within `h`; none if it does not.
+std::optional<double> HybridMotion::find_stretch(const Actions& actions, double h,
+                                                 const Instant& end, std::size_t cable) {
+  const auto value = [&](double time) {
+    integrate(actions, time, trial_);
+    return calc_spring_stretch(trial_, cable);
+  };
+  const double start = calc_spring_stretch(now(), cable);
+  double until = h, at_end = calc_spring_stretch(end, cable);
+  if (!(at_end > 0.0)) {
+    // It can reach its length and go back: between, the distance is greatest.
+    const double rate = now().geometry.stretch_rate[cable];
+    const double last_rate = end.geometry.stretch_rate[cable];
+    if (!(rate > 0.0 && last_rate < 0.0)) return {};
+    until = find_crossing(
+        [&](double time) {
+          integrate(actions, time, trial_);
+          return -trial_.geometry.stretch_rate[cable];
+        },
+        0.0, -rate, h, -last_rate);
+    at_end = value(until);
+    if (!(at_end > 0.0)) return {};
+  }
+  if (start >= 0.0) return 0.0;
+  return find_crossing(value, 0.0, start, until, at_end);
+}
+
 /// Flies to the first event within `h`, or to its end.
 HybridMotion::Found HybridMotion::find_first(const Actions& actions, double h) {
   integrate(actions, h, then());
@@ -526,8 +579,10 @@ HybridMotion::Found HybridMotion::find_first(const Actions& actions, double h) {
   const auto look = [&](const Limit& limit) {
     const bool is_held = holds(limit);
     if (is_held && is_stuck_) return;
-    const auto time = is_held ? find_loss(actions, first.time, middle, then(), limit)
-                              : find_arrival(actions, first.time, then(), limit);
+    const bool is_spring = limit.of == Limit::Of::kCable && stretches(limit.index);
+    const auto time = is_held     ? find_loss(actions, first.time, middle, then(), limit)
+                      : is_spring ? find_stretch(actions, first.time, then(), limit.index)
+                                  : find_arrival(actions, first.time, then(), limit);
     if (!time || (first.limit.of != Limit::Of::kNothing && !(*time < first.time))) return;
     first = {*time, limit};
     // Later events do not count.
@@ -545,6 +600,11 @@ void HybridMotion::meet(const Actions& actions, double time, const Limit& limit,
                         std::vector<Event>& events) {
   const Geometry& geometry = now().geometry;
   const Mode before = mode_;
+  if (limit.of == Limit::Of::kCable && stretches(limit.index)) {  // without an impact
+    mode_.stretched.add(limit.index);
+    choose(actions, unite(find_touching(now()), mode_.taut));
+    return report(before, time, events);
+  }
   Members meeting = mode_.taut, landing;
   (limit.of == Limit::Of::kCable ? meeting : landing).add(limit.index);
   // Ends that approach so slowly that they would not get away by more than rounding stay.
@@ -562,7 +622,7 @@ void HybridMotion::meet(const Actions& actions, double time, const Limit& limit,
     report(before, time, events);
     return;
   }
-  for (const std::size_t i : uncut_)
+  for (const std::size_t i : stiff_)
     if (geometry.stretch[i] >= -kTouching ||
         geometry.stretch[i] + kSimultaneous * geometry.stretch_rate[i] >= 0.0)
       meeting.add(i);
@@ -590,9 +650,11 @@ void HybridMotion::let_go(const Actions& actions, double time, const Limit& limi
                           std::vector<Event>& events) {
   const Mode before = mode_;
   if (limit.of == Limit::Of::kBody) set_free(limit.index);
+  const bool is_spring = limit.of == Limit::Of::kCable && stretches(limit.index);
+  if (is_spring) mode_.stretched.remove(limit.index);
   const Members candidates = unite(find_touching(now()), mode_.taut);
   choose(actions, candidates);
-  if (limit.of == Limit::Of::kCable && mode_.taut == before.taut)  // it is rounding of 0
+  if (limit.of == Limit::Of::kCable && !is_spring && mode_.taut == before.taut)  // rounding of 0
     keep(actions, without(before.taut, limit.index));
   report(before, time, events);
 }
@@ -601,9 +663,10 @@ void HybridMotion::let_go(const Actions& actions, double time, const Limit& limi
 /// or lifted off.
 void HybridMotion::report(const Mode& before, double time, std::vector<Event>& events) const {
   using Kind = Event::Kind;
+  const Members pulled = before.get_pulling(), pulling = mode_.get_pulling();
   for (const std::size_t i : uncut_)
-    if (before.taut.has(i) != mode_.taut.has(i))
-      events.push_back({mode_.taut.has(i) ? Kind::kTaut : Kind::kSlack, i, time, 0.0});
+    if (pulled.has(i) != pulling.has(i))
+      events.push_back({pulling.has(i) ? Kind::kTaut : Kind::kSlack, i, time, 0.0});
   for (const std::size_t body : bodies_)
     if (before.standing.has(body) != mode_.standing.has(body))
       events.push_back(
@@ -617,7 +680,9 @@ void HybridMotion::set_length(std::size_t cable, double length, double rate) {
 
 void HybridMotion::cut(std::size_t cable) {
   uncut_.remove(cable);
+  stiff_.remove(cable);
   mode_.taut.remove(cable);
+  mode_.stretched.remove(cable);
   hold(mode_.taut, now());
 }
 
@@ -647,7 +712,8 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
     return actions.length_acceleration[i] != 0.0 || now().motion.vehicles[i].length_rate != 0.0;
   };
   does_work_vary_ = actions.propulsion || actions.air.rotor_drag != 0.0 ||
-                    actions.load_drag.acts() || std::any_of(uncut_.begin(), uncut_.end(), winds);
+                    actions.load_drag.acts() || stiff_.size() < uncut_.size() ||
+                    std::any_of(uncut_.begin(), uncut_.end(), winds);
   double time = 0.0;
   for (int count = 1;; ++count) {
     is_later_ = count > 1;
@@ -677,7 +743,7 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
 /// Nothing is there to move if the cable between a vehicle and a load that stand shortens.
 void HybridMotion::check_held() const {
   if (!mode_.standing.has(kLoad)) return;
-  for (const std::size_t i : uncut_)
+  for (const std::size_t i : stiff_)
     if (mode_.standing.has(i) && now().geometry.stretch[i] > kLengthTolerance)
       throw std::runtime_error("cable " + std::to_string(i) +
                                ": its winch pulls at a vehicle and a load that both stand on the "

@@ -46,7 +46,8 @@ class HybridMotion {
   bool is_cut(std::size_t cable) const { return !uncut_.has(cable); }
 
   const Motion& motion() const { return now().motion; }
-  const Members& taut() const { return mode_.taut; }
+  /// Those that pull, or just hold.
+  Members taut() const { return mode_.get_pulling(); }
   /// Vehicles, and kLoad.
   const Members& standing() const { return mode_.standing; }
   /// Of the last step's actions, N; 0 of a slack cable and before the first step.
@@ -65,7 +66,10 @@ class HybridMotion {
 
   /// The limits that hold now: cables at their length that pull, bodies on the ground.
   struct Mode {
-    Members taut, standing;
+    Members taut;       // that do not stretch
+    Members stretched;  // those that do
+    Members standing;
+    Members get_pulling() const;
   };
 
   /// Forces of what holds: of the taut cables, and of the ground on standing bodies, upwards, N.
@@ -121,6 +125,10 @@ class HybridMotion {
                                   const Instant& end, const Limit& limit);
   std::optional<double> find_arrival(const Actions& actions, double h, const Instant& end,
                                      const Limit& limit);
+  double calc_spring_stretch(const Instant& instant, std::size_t cable) const;
+  std::optional<double> find_stretch(const Actions& actions, double h, const Instant& end,
+                                     std::size_t cable);
+  bool stretches(std::size_t cable) const { return system_.stiffness[cable] > 0.0; }
   Found find_first(const Actions& actions, double h);
   void meet(const Actions& actions, double time, const Limit& limit, std::vector<Event>& events);
   void let_go(const Actions& actions, double time, const Limit& limit, std::vector<Event>& events);
@@ -130,6 +138,7 @@ class HybridMotion {
   const System system_;
   System held_;                        // with the standing bodies infinitely heavy
   Members uncut_;                      // cables
+  Members stiff_;                      // those that do not stretch
   const Members bodies_;               // that the ground stops; none without ground
   const double inverse_energy_scale_;  // 1/J
   double energy_error_ = 0.0;

@@ -18,10 +18,13 @@ std::string show(const Eigen::Vector3d& v) {
          config::to_text(v.z()) + "]";
 }
 
-/// With the signals of cable, load, winch, release, ground, air and thrust those of so many rotors
-/// fit.
+/// With the signals of cable, stretch, load, winch, release, ground, air and thrust those of so
+/// many rotors fit.
 std::size_t count_most_rotors(const config::Scenario& scenario) {
-  return (model::kMaxNumbers - 14 - 6 - Air::count_signals(scenario.plant) -
+  const auto& keys = scenario.plant.own.get<CablesKeys>();
+  const bool stretches = std::any_of(keys.cables.begin(), keys.cables.end(),
+                                     [](const CableKeys& cable) { return cable.stiffness; });
+  return (model::kMaxNumbers - 14 - 6 - (stretches ? 1 : 0) - Air::count_signals(scenario.plant) -
           count_thrust_signals(scenario)) /
          2;
 }
@@ -55,7 +58,26 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
         turning.array() += vehicle.load_mass * vehicle.gravity / keys.load_inertia->array() *
                            ((squares.sum() - squares) / length + std::abs(cable.attachment.z()));
     }
-    return std::sqrt(square + turning.maxCoeff());
+    return std::max(std::sqrt(square + turning.maxCoeff()), calc_stretch_rate(scenario));
+  }
+
+  /// Bound of the fastest motion of a cable that stretches: README.md, "Cables that stretch".
+  static double calc_stretch_rate(const config::Scenario& scenario) {
+    const auto& keys = scenario.plant.own.get<CablesKeys>();
+    double stiffness = 0.0, damping = 0.0, load_mass = 0.0;
+    for (std::uint32_t i = 0; i < scenario.vehicles.size(); ++i)
+      load_mass += make_vehicle_scenario(scenario, i).vehicle.load_mass;
+    for (std::uint32_t i = 0; i < scenario.vehicles.size(); ++i) {
+      const CableKeys cable = get_cable(keys, i);
+      if (!cable.stiffness) continue;
+      double mobility =
+          1.0 / make_vehicle_scenario(scenario, i).vehicle.quad_mass + 1.0 / load_mass;
+      if (keys.load_inertia)
+        mobility += cable.attachment.squaredNorm() / keys.load_inertia->minCoeff();
+      stiffness += *cable.stiffness * mobility;
+      damping += cable.damping * mobility;
+    }
+    return std::max(std::sqrt(stiffness), damping);
   }
 
   void check(const config::Scenario& scenario, const config::Places& places) const override {
@@ -233,7 +255,10 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
           throw places.make_error_at(
               cable + rate,
               "expected this or vehicles[" + std::to_string(id) + "].quad_velocity_m_s, got both");
-      if (distance > length)
+      if (!get_cable(keys, id).stiffness && places.has(cable + ".damping_n_s_m"))
+        throw places.make_error_at(cable + ".damping_n_s_m",
+                                   "of a cable with stiffness_n_per_m, this one does not stretch");
+      if (distance > length && !get_cable(keys, id).stiffness)
         throw places.make_error_at(cable + ".distance_m", "expected at most the cable's length (" +
                                                               config::to_text(length) + "), got " +
                                                               config::to_text(distance));

@@ -32,6 +32,8 @@ struct CableKeys {
   std::optional<double> distance;                        ///< at the start, m; none: taut
   std::optional<double> alpha, beta;                     ///< at the start; none: of plant.initial
   std::optional<double> alpha_dot, beta_dot;             ///< the same, rad/s
+  std::optional<double> stiffness;                       ///< N/m; none: it does not stretch
+  double damping = 0.0;                                  ///< of one that stretches, N·s/m
   std::optional<WinchKeys> winch;                        ///< none: a constant length
   std::optional<std::int64_t> release_ns;                ///< when it is cut; none: never
 };
@@ -85,6 +87,8 @@ void describe(Map& map, CableKeys& cable) {
   map.key(kOptional, "beta_rad", cable.beta, config::kHalfTurn);
   map.key(kOptional, "alpha_dot_rad_s", cable.alpha_dot, config::kFinite);
   map.key(kOptional, "beta_dot_rad_s", cable.beta_dot, config::kFinite);
+  map.key(kOptional, "stiffness_n_per_m", cable.stiffness, config::kPositive);
+  map.key(kOptional, "damping_n_s_m", cable.damping, config::kNotNegative);
   map.key(kOptional, "winch", cable.winch);
   map.key(kOptional, "release_s", cable.release_ns, config::kPositive);
 }

@@ -254,11 +254,22 @@ Members find_candidates(const Members& cables, const Geometry& geometry, double 
   return candidates;
 }
 
+void add_springs(const System& system, const Geometry& geometry, const Members& stretched,
+                 Vector& tension, Motion& rate) {
+  if (stretched.empty()) return;
+  for (const std::size_t i : stretched)
+    tension[i] =
+        system.stiffness[i] * geometry.stretch[i] + system.damping[i] * geometry.stretch_rate[i];
+  add_pulls(system, geometry, tension, stretched, rate);
+}
+
 Accelerations calc_accelerations(const System& system, const Motion& motion,
                                  const Geometry& geometry, const Actions& actions,
-                                 const Members& candidates) {
+                                 const Members& candidates, const Members& stretched) {
   Accelerations result;
+  Vector springs{};
   calc_free_rate(system, motion, actions, result.rate);
+  add_springs(system, geometry, stretched, springs, result.rate);
   Vector offset;
   calc_offset(system, motion, geometry, actions, result.rate, candidates, offset);
   Matrix matrix;
@@ -267,6 +278,7 @@ Accelerations calc_accelerations(const System& system, const Motion& motion,
   result.tension = solution.pull;
   result.taut = solution.active;
   add_pulls(system, geometry, result.tension, result.taut, result.rate);
+  for (const std::size_t i : stretched) result.tension[i] = springs[i];
   return result;
 }
 

@@ -29,6 +29,8 @@ struct System {
   Eigen::Matrix3d inverse_inertia_L{};
   double gravity = 9.8;              ///< m/s², along +z
   double restitution = 0.0;          ///< of a cable that arrives at its length, 0 to 1
+  Vector stiffness{};                ///< of each cable that stretches, N/m; 0: it does not
+  Vector damping{};                  ///< of those, N·s/m
   std::optional<double> ground_z_W;  ///< bodies stand on it with their centre, m; none: no ground
 };
 
@@ -149,10 +151,16 @@ struct Accelerations {
 Members find_candidates(const Members& cables, const Geometry& geometry, double tolerance,
                         double rate_tolerance);
 
-/// The accelerations of `motion`, where of the `candidates` those pull that have to; eq. (5).
+/// Adds to the accelerations `rate` those by the cables `stretched`, and writes their tensions:
+/// eq. (19).
+void add_springs(const System& system, const Geometry& geometry, const Members& stretched,
+                 Vector& tension, Motion& rate);
+
+/// The accelerations of `motion` with the cables `stretched`, where of the `candidates` those pull
+/// that have to; eq. (5).
 Accelerations calc_accelerations(const System& system, const Motion& motion,
                                  const Geometry& geometry, const Actions& actions,
-                                 const Members& candidates);
+                                 const Members& candidates, const Members& stretched = {});
 
 /// Changes the velocities of `motion` so that no cable of `candidates`, all at their length,
 /// lengthens; eqs. (6) and (7). Returns the impulses of all cables, N·s.

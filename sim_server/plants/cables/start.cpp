@@ -79,7 +79,10 @@ Start make_start(const CablesKeys& keys, const std::vector<PlantSetup::Vehicle>&
     const Placed placed = place_cable(keys, vehicles[i], i);
     system.load_mass += vehicles[i].parameters.load_mass;
     system.vehicle_mass[i] = vehicles[i].parameters.quad_mass;
-    system.attachment_L[i] = get_cable(keys, i).attachment;
+    const CableKeys cable = get_cable(keys, i);
+    system.attachment_L[i] = cable.attachment;
+    system.stiffness[i] = cable.stiffness.value_or(0.0);
+    system.damping[i] = cable.damping;
     motion.vehicles[i] = {
         motion.p_WL + placed.p_LE_W - placed.distance * placed.rod.n_W,
         motion.v_WL + w_W.cross(placed.p_LE_W) - placed.distance * placed.rod.n_dot_W,
