@@ -241,7 +241,8 @@ void HybridMotion::pull(const Actions& held, Instant& instant) const {
   const Actions& actions = act(held, instant);
   calc_free_rate(held_, instant.motion, actions, instant.rate);
   instant.tension.fill(0.0);
-  add_springs(held_, instant.geometry, mode_.stretched, instant.tension, instant.rate);
+  if (!mode_.stretched.empty())
+    add_springs(held_, instant.geometry, mode_.stretched, instant.tension, instant.rate);
   Vector offset;
   calc_offset(held_, instant.motion, instant.geometry, actions, instant.rate, mode_.taut, offset);
   for (const std::size_t i : mode_.taut) offset[i] = -offset[i];
@@ -418,7 +419,8 @@ void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
     if (does_work_vary_) power += weight * calc_power(system_, at.motion, at.rate);
   };
   add_power(1.0, now());
-  const Members pulling = mode_.get_pulling();
+  if (!mode_.stretched.empty()) united_ = mode_.get_pulling();
+  const Members& pulling = mode_.stretched.empty() ? mode_.taut : united_;
   const auto calc_stage = [&](double share, const Motion& rate) {
     add(system_, now().motion, share * h, rate, stage.motion);
     calc_geometry(held_, stage.motion, pulling, stage.geometry);
@@ -590,7 +592,7 @@ HybridMotion::Found HybridMotion::find_first(const Actions& actions, double h) {
     middle = between_;
   };
   for (const std::size_t i : uncut_)
-    if (moves(i, mode_.standing)) look({Limit::Of::kCable, i});
+    if (moves(i, mode_.standing) || stretches(i)) look({Limit::Of::kCable, i});
   for (const std::size_t body : bodies_) look({Limit::Of::kBody, body});
   return first;
 }

@@ -143,6 +143,7 @@ class HybridMotion {
   const double inverse_energy_scale_;  // 1/J
   double energy_error_ = 0.0;
   Mode mode_;
+  Members united_;               // the pulling cables of a step, if some stretch
   std::array<Instant, 2> ends_;  // large: exchanged by their place
   std::size_t now_at_ = 0;
   Instant trial_, stage_;

@@ -23,6 +23,12 @@ Eigen::Vector4d calc_quaternion_rate(const Eigen::Vector4d& q, const Vector3d& w
   return rate;
 }
 
+Vector3d calc_drag(const Actions& actions, const Vehicle& vehicle, std::size_t i) {
+  model::Aerodynamics air = actions.air;
+  if (actions.v_wind_W) air.v_wind_W = (*actions.v_wind_W)[i];
+  return model::calc_rotor_drag(actions.f_Q_W[i], vehicle.v_W, air);
+}
+
 /// Of a body that stands on the ground: see hold_still().
 bool stands(double mass) { return std::isinf(mass); }
 
@@ -117,11 +123,7 @@ void calc_matrix(const System& system, const Geometry& geometry, const Members& 
 
 Vector3d calc_force(const Actions& actions, const Vehicle& vehicle, std::size_t i) {
   Vector3d force = actions.f_Q_W[i] + actions.disturbance_W;
-  if (actions.air.rotor_drag != 0.0) {
-    model::Aerodynamics air = actions.air;
-    if (actions.v_wind_W) air.v_wind_W = (*actions.v_wind_W)[i];
-    force += model::calc_rotor_drag(actions.f_Q_W[i], vehicle.v_W, air);
-  }
+  if (actions.air.rotor_drag != 0.0) force += calc_drag(actions, vehicle, i);
   return force;
 }
 
@@ -256,7 +258,6 @@ Members find_candidates(const Members& cables, const Geometry& geometry, double 
 
 void add_springs(const System& system, const Geometry& geometry, const Members& stretched,
                  Vector& tension, Motion& rate) {
-  if (stretched.empty()) return;
   for (const std::size_t i : stretched)
     tension[i] =
         system.stiffness[i] * geometry.stretch[i] + system.damping[i] * geometry.stretch_rate[i];
@@ -269,7 +270,7 @@ Accelerations calc_accelerations(const System& system, const Motion& motion,
   Accelerations result;
   Vector springs{};
   calc_free_rate(system, motion, actions, result.rate);
-  add_springs(system, geometry, stretched, springs, result.rate);
+  if (!stretched.empty()) add_springs(system, geometry, stretched, springs, result.rate);
   Vector offset;
   calc_offset(system, motion, geometry, actions, result.rate, candidates, offset);
   Matrix matrix;

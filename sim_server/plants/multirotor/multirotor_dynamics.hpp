@@ -69,8 +69,9 @@ class MultirotorDynamics {
     const SimTK::Vec3 free_a_WC = gravity_W_ + force_W / mass_;
     const SimTK::Vec3 free_a_WA = free_a_WC + R_WB * (free_b_B % p_CA_B_ + w_B % (w_B % p_CA_B_));
 
-    const JointForce joint = kind_ == PendulumBody::kPoint ? hold_point(at, free_a_WA, on_load)
-                                                           : hold_rigid(at, free_a_WA, on_load);
+    const Load load = calc_load(at, on_load);
+    const JointForce joint = kind_ == PendulumBody::kPoint ? hold_point(at, free_a_WA, load)
+                                                           : hold_rigid(at, free_a_WA, load);
     // Eq. (12).
     const SimTK::Vec3 b_B = free_b_B + inverse_inertia_B_ * (p_CA_B_ % (~R_WB * joint.on_body_W));
     const SimTK::Vec3 a_WC = free_a_WC + joint.on_body_W / mass_;
@@ -84,34 +85,41 @@ class MultirotorDynamics {
     SimTK::Vec3 b_WP_W;     // of the pendulum with this force
   };
 
+  /// What the load (of kRigid, the pendulum's centre) does without its joint, besides (10).
+  struct Load {
+    SimTK::Vec3 free_a_W;  // m/s²
+    bool is_pushed;        // by a force on the load
+    SimTK::Vec3 b_P;       // by that force, of kRigid, rad/s²
+  };
+  Load calc_load(const Rotations& at, const LoadForce* on_load) const {
+    if (!on_load) return {gravity_W_, false, {}};
+    const SimTK::Vec3 p_GL(0, 0, on_load->distance - centre_);
+    SimTK::Vec3 b_P(0);
+    if (kind_ == PendulumBody::kRigid)
+      b_P = inverse_pendulum_inertia_P_ * (p_GL % (~at.R_WP * on_load->force_W));
+    return {gravity_W_ + on_load->force_W / pendulum_mass_, true, b_P};
+  }
+
   /// Eqs. (8) and (9): a point load, which can only be pulled along the rod.
-  JointForce hold_point(const Rotations& at, const SimTK::Vec3& free_a_WA,
-                        const LoadForce* on_load) const {
-    SimTK::Vec3 free_a_WL = gravity_W_;
-    if (on_load) free_a_WL += on_load->force_W / pendulum_mass_;
+  JointForce hold_point(const Rotations& at, const SimTK::Vec3& free_a_WA, const Load& load) const {
     const SimTK::Vec3 n_W = at.R_WP.z(), n_dot_W = at.w_WP_W % n_W;
     const SimTK::Vec3 moved_W = at.R_WB * (mobility_B_ * (~at.R_WB * n_W));  // m/s² per N
-    const double tension = (~n_W * (free_a_WL - free_a_WA) + centre_ * n_dot_W.normSqr()) /
+    const double tension = (~n_W * (load.free_a_W - free_a_WA) + centre_ * n_dot_W.normSqr()) /
                            (1.0 / pendulum_mass_ + ~n_W * moved_W);
-    const SimTK::Vec3 a_WL = free_a_WL - tension / pendulum_mass_ * n_W;
+    const SimTK::Vec3 a_WL = load.free_a_W - tension / pendulum_mass_ * n_W;
     const SimTK::Vec3 n_ddot_W = (a_WL - free_a_WA - tension * moved_W) / centre_;
     return {tension * n_W, n_W % n_ddot_W - (~at.w_WP_W * n_W) * (n_W % at.w_WP_W)};
   }
 
   /// Eqs. (10) and (11): rod and load as one body. Computed in P.
-  JointForce hold_rigid(const Rotations& at, const SimTK::Vec3& free_a_WA,
-                        const LoadForce* on_load) const {
+  [[gnu::flatten]] JointForce hold_rigid(const Rotations& at, const SimTK::Vec3& free_a_WA,
+                                         const Load& load) const {
     const SimTK::Rotation R_PB = ~at.R_WP * at.R_WB;
     const SimTK::Vec3 w_P = ~at.R_WP * at.w_WP_W;
     const SimTK::Vec3 p_GA(0, 0, -centre_);  // from the centre of mass to the joint
     SimTK::Vec3 free_b_P = inverse_pendulum_inertia_P_ * -(w_P % (pendulum_inertia_P_ * w_P));
-    SimTK::Vec3 free_a_WG = gravity_W_;
-    if (on_load) {
-      const SimTK::Vec3 p_GL(0, 0, on_load->distance - centre_);
-      free_b_P += inverse_pendulum_inertia_P_ * (p_GL % (~at.R_WP * on_load->force_W));
-      free_a_WG += on_load->force_W / pendulum_mass_;
-    }
-    const SimTK::Vec3 free_a_P = ~at.R_WP * free_a_WG + free_b_P % p_GA + w_P % (w_P % p_GA);
+    if (load.is_pushed) free_b_P += load.b_P;
+    const SimTK::Vec3 free_a_P = ~at.R_WP * load.free_a_W + free_b_P % p_GA + w_P % (w_P % p_GA);
     const SimTK::Mat33 mobility = R_PB * mobility_B_ * ~R_PB + pendulum_mobility_P_;
     const SimTK::Vec3 on_body_P = solve(mobility, free_a_P - ~at.R_WP * free_a_WA);
     const SimTK::Vec3 b_P = free_b_P - inverse_pendulum_inertia_P_ * (p_GA % on_body_P);
@@ -126,11 +134,9 @@ class MultirotorDynamics {
     return to_simtk(Eigen::Matrix3d::Identity() / mass - cross * to_eigen(inverse_inertia) * cross);
   }
 
+  /// Both store columns, without gaps.
   static Eigen::Matrix3d to_eigen(const SimTK::Mat33& m) {
-    Eigen::Matrix3d result;
-    for (int row = 0; row < 3; ++row)
-      for (int column = 0; column < 3; ++column) result(row, column) = m(row, column);
-    return result;
+    return Eigen::Map<const Eigen::Matrix3d>(&m(0, 0));
   }
   static SimTK::Mat33 to_simtk(const Eigen::Matrix3d& m) {
     return {m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2)};
