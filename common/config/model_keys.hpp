@@ -60,6 +60,8 @@ class ModelKeys {
     return std::sqrt(vehicle.total_mass() * vehicle.gravity /
                      (vehicle.quad_mass * vehicle.rod_length));
   }
+  /// Bound of the fastest oscillation or decay of springs and dampers in a plant, 1/s.
+  virtual double calc_spring_rate(const Scenario&) const { return 0.0; }
   /// The one load of a plant whose vehicles carry it together. Called after `check`.
   virtual std::optional<model::SharedLoad> calc_shared_load(const Scenario&) const { return {}; }
 };

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <fstream>
 #include <iterator>
+#include <limits>
 #include <system_error>
 
 #include "common/config/numbers.hpp"
@@ -247,33 +248,68 @@ void check_attitudes(const Scenario& scenario, const Places& places) {
     }
 }
 
-/// Refuses a step that is too coarse for the fastest swing, and warns of one that damps it
-/// (sim_server/plants/README.md). A plant in a library has steps of its own.
-void check_step(Scenario& scenario, const Places& places) {
-  constexpr double kMost = 1.0, kFine = 0.25;  // angle of the swing in a step, rad
-  if (scenario.plant.model.is_shared_library()) return;
-  const auto& plant = find_model_keys(places.models().plants, scenario.plant.model);
-  double rate = 0.0;
-  for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id)
-    rate = std::max(rate, plant.calc_swing_rate(scenario, id));
-  const double step = to_seconds(scenario.plant.step_ns), angle = rate * step;
-  if (angle <= kFine) return;
-  const bool is_refused = angle > kMost;
-  const double most = std::floor((is_refused ? kMost : kFine) / rate * 1e6) / 1e6;
-  const ConfigError error = places.make_error_at(
-      "plant.step_s", "expected at most " + to_text(most) + " for a swing of " +
-                          to_text(std::round(rate * 10.0) / 10.0) + " rad/s, got " + to_text(step) +
-                          (is_refused ? "" : ": the swing loses energy"));
-  if (is_refused) throw error;
-  scenario.warnings.push_back(error.what());
+/// Bound of the rate with which the drag of the load slows it, 1/s.
+double calc_drag_rate(const Scenario& scenario) {
+  const model::LoadDrag& drag = scenario.plant.load_drag;
+  double speed = scenario.plant.air.v_wind_W.norm() + scenario.plant.initial.v_WQ.norm();
+  for (const Gust& gust : scenario.plant.wind.gusts) speed += gust.v_wind_W.norm();
+  double mass = scenario.shared_load ? 0.0 : std::numeric_limits<double>::infinity();
+  for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id) {
+    const double own = make_vehicle_scenario(scenario, id).vehicle.load_mass;
+    mass = scenario.shared_load ? mass + own : std::min(mass, own);
+  }
+  return (drag.linear + drag.air_density * drag.area * speed) / mass;
 }
 
-/// Turbulence does not change where it stands still: the mean wind carries it.
+/// Refuses a step that is too coarse for the fastest motion, and warns of one that is hardly fine
+/// enough (sim_server/plants/README.md). A plant in a library has steps of its own.
+void check_step(Scenario& scenario, const Places& places) {
+  constexpr double kMost = 1.0, kFine = 0.25;  // of rate × step
+  if (scenario.plant.model.is_shared_library()) return;
+  const auto& plant = find_model_keys(places.models().plants, scenario.plant.model);
+  double swing = 0.0;
+  for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id)
+    swing = std::max(swing, plant.calc_swing_rate(scenario, id));
+  const double step = to_seconds(scenario.plant.step_ns);
+  const auto judge = [&](double rate, const char* of, const char* unit, const char* effect) {
+    if (rate * step <= kFine) return;
+    const bool is_refused = !(rate * step <= kMost);
+    const double most = std::floor((is_refused ? kMost : kFine) / rate * 1e6) / 1e6;
+    const ConfigError error = places.make_error_at(
+        "plant.step_s", "expected at most " + to_text(most) + " for " + of + " " +
+                            to_text(std::round(rate * 10.0) / 10.0) + " " + unit + ", got " +
+                            to_text(step) + (is_refused ? "" : effect));
+    if (is_refused) throw error;
+    scenario.warnings.push_back(error.what());
+  };
+  judge(swing, "a swing of", "rad/s", ": the swing loses energy");
+  judge(plant.calc_spring_rate(scenario), "a cable that stretches with", "1/s",
+        ": its oscillation loses energy");
+  judge(calc_drag_rate(scenario), "a load that its drag slows with", "1/s",
+        ": its drag is less exact");
+}
+
+/// The mean wind carries turbulence, at a speed of the air, past bodies that are near the origin.
 void check_wind(const Scenario& scenario, const Places& places) {
-  const Eigen::Vector3d& mean = scenario.plant.air.v_wind_W;
-  if (scenario.plant.wind.turbulence && mean.head<2>().isZero(0.0))
+  if (!scenario.plant.wind.turbulence) return;
+  constexpr double kMost = 100.0, kReach = 500.0;  // m/s and m
+  const Eigen::Vector2d mean = scenario.plant.air.v_wind_W.head<2>();
+  const double speed = std::sqrt(mean.squaredNorm());
+  if (!(speed > 0.0 && speed <= kMost))
     throw places.make_error_at("plant.wind.turbulence",
-                               "expected a level plant.wind_m_s, which carries it, got none");
+                               "expected a plant.wind_m_s that carries it, level with > 0 and at "
+                               "most 100 m/s, got " +
+                                   to_text(speed));
+  for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id) {
+    const Eigen::Vector3d start = make_vehicle_scenario(scenario, id).plant.initial.position;
+    const double along = (mean.x() * start.x() + mean.y() * start.y()) / speed;
+    if (!(std::abs(along) <= kReach))
+      throw places.make_error_at("plant.initial",
+                                 "expected vehicle " + std::to_string(id) +
+                                     " within 500 m of the origin along the wind, as "
+                                     "plant.wind.turbulence needs, got " +
+                                     to_text(along) + " m");
+  }
 }
 
 /// Failures are of vehicles and rotors that are there, and a battery can give the power to hover.
@@ -287,10 +323,13 @@ void check_thrust(const Scenario& scenario, std::size_t rotors, const Places& pl
       throw places.make_error_at(path + "vehicle", "expected < the number of vehicles (" +
                                                        std::to_string(count) + "), got " +
                                                        std::to_string(failure.vehicle));
+    if (failure.rotor && rotors == 0)
+      throw places.make_error_at(path + "rotor",
+                                 "of vehicles with rotors, here they are point masses");
     if (failure.rotor && *failure.rotor > static_cast<int>(rotors))
-      throw places.make_error_at(
-          path + "rotor", "expected a rotor from 1 to " + std::to_string(rotors) +
-                              " (a point mass has none), got " + std::to_string(*failure.rotor));
+      throw places.make_error_at(path + "rotor", "expected a rotor from 1 to " +
+                                                     std::to_string(rotors) + ", got " +
+                                                     std::to_string(*failure.rotor));
   }
   if (!thrust.battery) return;
   const Battery& battery = *thrust.battery;

@@ -11,6 +11,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -51,6 +52,12 @@ inline constexpr NumberRule kRate{"from 0.001 to 1000",
                                   [](double x) { return x >= 1e-3 && x <= 1e3; }};
 inline constexpr NumberRule kLowAltitude{"from 3 to 300",
                                          [](double x) { return x >= 3.0 && x <= 300.0; }};
+inline constexpr NumberRule kWind{"from -1000 to 1000",
+                                  [](double x) { return std::abs(x) <= 1e3; }};
+inline constexpr NumberRule kWindSpeed{"> 0 and at most 1000",
+                                       [](double x) { return x > 0.0 && x <= 1e3; }};
+inline constexpr NumberRule kBatteryNumber{"> 0 and at most 1000000",
+                                           [](double x) { return x > 0.0 && x <= 1e6; }};
 inline constexpr NumberRule kFlushInterval{"> 0 and <= 0.2",
                                            [](double x) { return x > 0.0 && x <= 0.2; }};
 
@@ -204,13 +211,13 @@ void describe(Map& map, Gust& gust) {
   map.key(kRequired, "at_s", gust.at_ns, kNotNegative);
   map.key(kOptional, "rise_s", gust.rise_ns, kNotNegative);
   map.key(kOptional, "for_s", gust.for_ns, kPositive);
-  map.key(kRequired, "wind_m_s", gust.v_wind_W);
+  map.key(kRequired, "wind_m_s", gust.v_wind_W, kWind);
 }
 
 template <class Map>
 void describe(Map& map, Turbulence& turbulence) {
   map.key(kRequired, "altitude_m", turbulence.altitude, kLowAltitude);
-  map.key(kRequired, "w20_m_s", turbulence.w20, kPositive);
+  map.key(kRequired, "w20_m_s", turbulence.w20, kWindSpeed);
   map.key(kOptional, "seed", turbulence.seed, kSeeds);
 }
 
@@ -229,11 +236,11 @@ void describe(Map& map, model::LoadDrag& drag) {
 
 template <class Map>
 void describe(Map& map, Battery& battery) {
-  map.key(kRequired, "full_v", battery.full_v, kPositive);
-  map.key(kRequired, "empty_v", battery.empty_v, kPositive);
+  map.key(kRequired, "full_v", battery.full_v, kBatteryNumber);
+  map.key(kRequired, "empty_v", battery.empty_v, kBatteryNumber);
   map.key(kOptional, "resistance_ohm", battery.resistance_ohm, kNotNegative);
-  map.key(kRequired, "capacity_ah", battery.capacity_ah, kPositive);
-  map.key(kRequired, "hover_power_w", battery.hover_power_w, kPositive);
+  map.key(kRequired, "capacity_ah", battery.capacity_ah, kBatteryNumber);
+  map.key(kRequired, "hover_power_w", battery.hover_power_w, kBatteryNumber);
 }
 
 template <class Map>

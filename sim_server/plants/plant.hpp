@@ -65,6 +65,7 @@ struct PlantSetup {
   config::Autopilot autopilot;    ///< for plants that use one
   std::filesystem::path folder;   ///< of the scenario file
   std::vector<Vehicle> vehicles;  ///< at least one, by ascending id
+  bool lacks_thrust = false;      ///< a vehicle of the fleet gives another thrust than believed
   config::Estimator estimator;    ///< for an autopilot inside the plant, not for `seen`
 };
 

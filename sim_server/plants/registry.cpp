@@ -75,6 +75,7 @@ std::unique_ptr<Plant> make_plant_of(const PlantType& type, const config::Scenar
   setup.folder = scenario.folder;
   setup.estimator = scenario.estimator;
   setup.vehicles = vehicles;
+  setup.lacks_thrust = count_thrust_signals(scenario) > 0;
   auto plant = make_sensed(make_tired(type.make(setup), setup), setup, scenario);
   check_signals(plant->signals(), scenario.plant.model);
   return plant;

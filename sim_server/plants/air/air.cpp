@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
 
 namespace sls::sim {
 namespace {
@@ -47,6 +48,8 @@ void Air::list_signals(std::vector<Signal>& signals) const {
 void Air::add_signals(double time, const Vector3d& p_WQ, const Vector3d& p_WL, const Vector3d& v_WL,
                       model::Numbers& signals) const {
   const auto add = [&signals](const Vector3d& v) {
+    if (!v.allFinite())
+      throw std::runtime_error("the wind, or the drag of the load, is not finite");
     signals.conservativeResize(signals.size() + 3);
     signals.tail<3>() = v;
   };

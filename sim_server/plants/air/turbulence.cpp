@@ -13,7 +13,6 @@ using Eigen::Vector2d, Eigen::Vector3d;
 
 namespace {
 
-constexpr double kReach = 500.0;  // m
 constexpr double kFoot = 0.3048;  // m
 
 double power(double base, double exponent) { return math::exp(exponent * math::log(base)); }
@@ -78,19 +77,21 @@ Vector3d Turbulence::at(double way) {
   const double place = std::floor(way / spacing_);
   const auto index = static_cast<std::int64_t>(place);
   while (next_ <= index + 1) computed_.push_back(extend());
-  const auto most = static_cast<std::size_t>(2.0 * kReach / spacing_);
+  const auto most = static_cast<std::size_t>(2.0 * kReach / spacing_) + 3;
   while (computed_.size() > most) computed_.pop_front();
   const std::int64_t from_end = next_ - index;  // 2 or more
-  if (from_end > static_cast<std::int64_t>(computed_.size()))
-    throw std::runtime_error(
-        "turbulence: a body is more than 500 m upwind of the origin or of another body");
   const auto at = computed_.end() - from_end;
   const double share = way / spacing_ - place;
   return at[0] + share * (at[1] - at[0]);
 }
 
 Vector3d Turbulence::at(double time, const Vector3d& p_W) {
-  const Vector3d own = at(speed_ * time - model::dot(along_W_, p_W));
+  const double along = model::dot(along_W_, p_W);
+  if (!(std::abs(along) <= kReach))
+    throw std::runtime_error(
+        "turbulence: expected bodies within 500 m of the origin along the "
+        "wind, got one further away");
+  const Vector3d own = at(speed_ * time - along);
   const Vector3d across_W(-along_W_.y(), along_W_.x(), 0.0);
   return own.x() * along_W_ + own.y() * across_W + own.z() * Vector3d::UnitZ();
 }

@@ -23,12 +23,15 @@ class Turbulence {
   Turbulence(const config::Turbulence& turbulence, const Eigen::Vector3d& v_wind_W);
 
   /// Velocity that it adds at a time (s) and place (m, in W): m/s, in W.
-  /// @throws std::runtime_error at a place more than 500 m from where a still body would be.
+  /// @throws std::runtime_error at a place that is further than kReach from the origin, along the
+  ///   wind.
   Eigen::Vector3d at(double time, const Eigen::Vector3d& p_W);
 
-  /// In the axes of the wind, `way` metres into the air that was at the origin at time 0.
+  /// In the axes of the wind, `way` metres into the air that was at the origin at time 0. The ways
+  /// of all calls grow, but for 2 kReach.
   Eigen::Vector3d at(double way);
-  double spacing() const { return spacing_; }  ///< of the computed places, m
+
+  static constexpr double kReach = 500.0;  ///< m
 
  private:
   /// An output of the filters: one of first order, two of second order.

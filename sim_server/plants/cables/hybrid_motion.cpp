@@ -416,7 +416,10 @@ void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
   Motion sum;
   double power = 0.0;  // six times the mean of what the forces give
   const auto add_power = [&](double weight, const Instant& at) {
-    if (does_work_vary_) power += weight * calc_power(system_, at.motion, at.rate);
+    if (!does_work_vary_) return;
+    power += weight * calc_power(system_, at.motion, at.rate);
+    for (const std::size_t i : mode_.stretched)  // what springs take, they keep
+      power += weight * system_.stiffness[i] * at.geometry.stretch[i] * at.geometry.stretch_rate[i];
   };
   add_power(1.0, now());
   if (!mode_.stretched.empty()) united_ = mode_.get_pulling();
@@ -439,20 +442,24 @@ void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
   calc_stage(1.0, stage.rate);
   add(system_, sum, 1.0, stage.rate, sum);
   add_power(1.0, stage);
-  work_ = h / 6.0 * power;
+  end.work = h / 6.0 * power;
   add(system_, now().motion, h / 6.0, sum, end.motion);
-  drift_ = settle(mode_.taut, end);
+  end.drift = settle(mode_.taut, end);
   pull(actions, end);
 }
 
-/// Compares the change of energy in the part of a step last integrated with the work: eq. (18).
+/// Compares the change of energy in the part of a step that ends then with the work: eq. (18).
 /// Held forces and cables that kept their length give no error worth its cost.
 void HybridMotion::note_energy_error(const Actions& actions) {
-  if (!does_work_vary_ && !(drift_ > kDrift)) return;
+  if (!does_work_vary_ && !(then().drift > kDrift)) return;
   const Motion &start = now().motion, &end = then().motion;
-  const double gained = does_work_vary_ ? calc_kinetic_change(system_, start, end) - work_
-                                        : calc_energy_gain(system_, actions, start, end);
-  energy_error_ += std::abs(gained) * inverse_energy_scale_;
+  double gained = does_work_vary_ ? calc_kinetic_change(system_, start, end) - then().work
+                                  : calc_energy_gain(system_, actions, start, end);
+  for (const std::size_t i : mode_.stretched) {
+    const double before = now().geometry.stretch[i], after = then().geometry.stretch[i];
+    gained += 0.5 * system_.stiffness[i] * (after - before) * (after + before);
+  }
+  energy_gain_ += gained * inverse_energy_scale_;
 }
 
 /// How far a limit that holds is lost, N: by a negative tension, or a lift.
@@ -709,7 +716,7 @@ void HybridMotion::step(const Actions& actions, double h, std::vector<Event>& ev
     choose(actions, candidates);
     report(before, 0.0, events);
   }
-  energy_error_ *= std::max(0.0, 1.0 - h);
+  energy_gain_ *= std::max(0.0, 1.0 - h);
   const auto winds = [&](std::size_t i) {
     return actions.length_acceleration[i] != 0.0 || now().motion.vehicles[i].length_rate != 0.0;
   };

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <optional>
 #include <vector>
@@ -54,7 +55,7 @@ class HybridMotion {
   const Vector& tension() const { return now().tension; }
   /// What the method itself gained or lost of the energy in about the last second, per energy that
   /// lifts the lightest body by the longest cable: README.md, eq. (18).
-  double energy_error() const { return energy_error_; }
+  double energy_error() const { return std::abs(energy_gain_); }
 
   static constexpr double kLengthTolerance = 1e-9;  ///< m
   /// Energy errors: above the first a flight may be wrong by 1 % of a cable, above the second it is
@@ -85,6 +86,9 @@ class HybridMotion {
     Factor factor;      ///< of the taut ones
     Motion rate;
     RotorSpeeds rotors;
+    // Of the part of a step that ends here:
+    double work;   // if it varies, J
+    double drift;  // of a cable from its length, before eq. (8), m
   };
 
   /// A cable, whose limit is its length, or a body, whose limit is the ground.
@@ -141,7 +145,7 @@ class HybridMotion {
   Members stiff_;                      // those that do not stretch
   const Members bodies_;               // that the ground stops; none without ground
   const double inverse_energy_scale_;  // 1/J
-  double energy_error_ = 0.0;
+  double energy_gain_ = 0.0;           // of eq. (18)
   Mode mode_;
   Members united_;               // the pulling cables of a step, if some stretch
   std::array<Instant, 2> ends_;  // large: exchanged by their place
@@ -151,8 +155,6 @@ class HybridMotion {
   mutable Actions acting_;       // of the rotors at one instant; a member because it is large
   Holding between_;              // in the middle of the step last integrated
   bool does_work_vary_ = false;  // between the stages of a step: a force that is held gives f · Δx
-  double drift_ = 0.0;           // of a cable in the part of a step last integrated, m
-  double work_ = 0.0;            // if so, in the part of a step last integrated, J
   double force_scale_ = 0.0;     // of all forces, N
   bool is_later_ = false;        // not the first event of a step
   bool is_stuck_ = false;

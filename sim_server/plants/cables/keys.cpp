@@ -58,11 +58,11 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
         turning.array() += vehicle.load_mass * vehicle.gravity / keys.load_inertia->array() *
                            ((squares.sum() - squares) / length + std::abs(cable.attachment.z()));
     }
-    return std::max(std::sqrt(square + turning.maxCoeff()), calc_stretch_rate(scenario));
+    return std::sqrt(square + turning.maxCoeff());
   }
 
-  /// Bound of the fastest motion of a cable that stretches: README.md, "Cables that stretch".
-  static double calc_stretch_rate(const config::Scenario& scenario) {
+  /// README.md, "Cables that stretch".
+  double calc_spring_rate(const config::Scenario& scenario) const override {
     const auto& keys = scenario.plant.own.get<CablesKeys>();
     double stiffness = 0.0, damping = 0.0, load_mass = 0.0;
     for (std::uint32_t i = 0; i < scenario.vehicles.size(); ++i)
@@ -255,7 +255,7 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
           throw places.make_error_at(
               cable + rate,
               "expected this or vehicles[" + std::to_string(id) + "].quad_velocity_m_s, got both");
-      if (!get_cable(keys, id).stiffness && places.has(cable + ".damping_n_s_m"))
+      if (!get_cable(keys, id).stiffness && get_cable(keys, id).damping > 0.0)
         throw places.make_error_at(cable + ".damping_n_s_m",
                                    "of a cable with stiffness_n_per_m, this one does not stretch");
       if (distance > length && !get_cable(keys, id).stiffness)

@@ -33,7 +33,7 @@ RotorDrive::RotorDrive(const AirframeKeys& keys, const PlantSetup& setup, std::s
     lags_.emplace_back(rotor, step_s_);
     own_scales_.push_back(rotor.thrust_scale);
   }
-  if (ThrustSource::acts(setup)) source_.emplace(setup, vehicle);
+  if (setup.lacks_thrust) source_.emplace(setup, vehicle);
   AutopilotSetup given{setup.autopilot, setup.folder, setup.vehicles[vehicle].id,
                        setup.vehicles[vehicle].parameters, airframe_};
   if (given.autopilot.period_ns == 0) given.autopilot.period_ns = setup.plant.step_ns;

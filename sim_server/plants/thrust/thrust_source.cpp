@@ -16,13 +16,6 @@ ThrustSource::ThrustSource(const PlantSetup& setup, std::size_t vehicle)
   if (thrust_.battery) power_ = thrust_.battery->hover_power_w;
 }
 
-bool ThrustSource::acts(const PlantSetup& setup) {
-  const config::Thrust& thrust = setup.plant.thrust;
-  return thrust.drift != 0.0 || thrust.battery || !thrust.failures.empty() ||
-         std::any_of(setup.vehicles.begin(), setup.vehicles.end(),
-                     [](const auto& vehicle) { return vehicle.thrust_scale != 1.0; });
-}
-
 /// Eq. (11): what is left of the open-circuit voltage under the power of the last step.
 double ThrustSource::calc_voltage() const {
   const config::Battery& battery = *thrust_.battery;
@@ -134,7 +127,7 @@ class TiredPlant : public Plant {
 }  // namespace
 
 std::unique_ptr<Plant> make_tired(std::unique_ptr<Plant> plant, const PlantSetup& setup) {
-  if (plant->has_attitude() || !ThrustSource::acts(setup)) return plant;
+  if (plant->has_attitude() || !setup.lacks_thrust) return plant;
   return std::make_unique<TiredPlant>(std::move(plant), setup);
 }
 

@@ -12,7 +12,7 @@
 
 namespace sls::sim {
 
-/// How many signals the thrust of a vehicle has.
+/// How many signals the thrust of each vehicle has: 0 if all give what is wanted.
 inline std::size_t count_thrust_signals(const config::Scenario& scenario) {
   const config::Thrust& thrust = scenario.plant.thrust;
   bool acts = thrust.scale != 1.0 || thrust.drift != 0.0 || !thrust.failures.empty();
@@ -25,8 +25,6 @@ class ThrustSource {
   /// That of `setup.vehicles[vehicle]`.
   ThrustSource(const PlantSetup& setup, std::size_t vehicle);
 
-  /// True if the thrust of a vehicle can differ from what is wanted.
-  static bool acts(const PlantSetup& setup);
   /// True thrust per believed thrust of the whole vehicle, from `step` on; without failures of
   /// single rotors.
   double calc_scale(std::int64_t step) const;

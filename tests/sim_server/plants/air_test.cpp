@@ -97,8 +97,10 @@ TEST(TurbulenceTest, IsOneFieldThatTheMeanWindCarries) {
   EXPECT_LE((other.calc_wind(3.4, p + 7.0 * along) - here).norm(), 1e-12);
   EXPECT_LE((other.calc_wind(2.0, p + Vector3d(40.0, 30.0, 9.0)) - here).norm(), 1e-12);
   EXPECT_GT((other.calc_wind(2.0, p + 7.0 * along) - here).norm(), 0.01);
-  EXPECT_EQ(test::find_error<std::runtime_error>([&] { air.calc_wind(0.0, 600.0 * along); }),
-            "turbulence: a body is more than 500 m upwind of the origin or of another body");
+  EXPECT_EQ(
+      test::find_error<std::runtime_error>([&] { air.calc_wind(0.0, 600.0 * along); }),
+      "turbulence: expected bodies within 500 m of the origin along the wind, got one further "
+      "away");
 }
 
 TEST(AirTest, GustsComeStayAndGo) {

@@ -44,6 +44,15 @@ TEST(ThrustTest, APointMassGetsItsOwnScaleWithDriftUntilItFails) {
   }
 }
 
+TEST(ThrustTest, AllVehiclesOfAFleetHaveTheSameSignals) {
+  config::Scenario scenario;
+  scenario.vehicles.resize(2);
+  scenario.vehicles[1].thrust_scale = 0.9;
+  const auto plants = make(scenario);
+  for (const std::size_t i : {0, 1})
+    EXPECT_EQ(find(*plants[i].plant, 0, "thrust_scale"), i == 0 ? 1.0 : 0.9);
+}
+
 /// A quadrotor whose rotors are at (±0.2, ±0.2) m, alone or on a cable.
 config::Scenario make_quadrotor(const std::string& model) {
   config::Scenario scenario;
