@@ -146,14 +146,19 @@ std::optional<std::string> find_missing_offset(const SampleOffset& offset, Fault
                  : std::nullopt;
 }
 
+void check_vehicle(int id, const std::string& path, const Scenario& scenario,
+                   const Places& places) {
+  const std::size_t count = scenario.vehicles.size();
+  if (static_cast<std::size_t>(id) >= count)
+    throw places.make_error_at(path, "expected < the number of vehicles (" + std::to_string(count) +
+                                         "), got " + std::to_string(id));
+}
+
 void check_faults(const Scenario& scenario, const Places& places) {
   for (std::size_t i = 0; i < scenario.faults.size(); ++i) {
     const Fault& fault = scenario.faults[i];
     const std::string path = to_fault_path(scenario, i);
-    if (static_cast<std::size_t>(fault.vehicle) >= scenario.vehicles.size())
-      throw places.make_error_at(path + ".vehicle", "expected < the number of vehicles (" +
-                                                        std::to_string(scenario.vehicles.size()) +
-                                                        "), got " + std::to_string(fault.vehicle));
+    check_vehicle(fault.vehicle, path + ".vehicle", scenario, places);
     if (fault.to_ns <= fault.from_ns)
       throw places.make_error_at(path + ".to_s", "expected > from_s (" +
                                                      to_seconds_text(fault.from_ns) + "), got " +
@@ -254,9 +259,9 @@ double calc_drag_rate(const Scenario& scenario) {
   double speed = scenario.plant.air.v_wind_W.norm() + scenario.plant.initial.v_WQ.norm();
   for (const Gust& gust : scenario.plant.wind.gusts) speed += gust.v_wind_W.norm();
   double mass = scenario.shared_load ? 0.0 : std::numeric_limits<double>::infinity();
-  for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id) {
-    const double own = make_vehicle_scenario(scenario, id).vehicle.load_mass;
-    mass = scenario.shared_load ? mass + own : std::min(mass, own);
+  for (const VehicleVariant& own : scenario.vehicles) {
+    const double load = own.load_mass.value_or(scenario.vehicle.load_mass);
+    mass = scenario.shared_load ? mass + load : std::min(mass, load);
   }
   return (drag.linear + drag.air_density * drag.area * speed) / mass;
 }
@@ -292,7 +297,7 @@ void check_step(Scenario& scenario, const Places& places) {
 /// The mean wind carries turbulence, at a speed of the air, past bodies that are near the origin.
 void check_wind(const Scenario& scenario, const Places& places) {
   if (!scenario.plant.wind.turbulence) return;
-  constexpr double kMost = 100.0, kReach = 500.0;  // m/s and m
+  constexpr double kMost = 100.0;  // m/s
   const Eigen::Vector2d mean = scenario.plant.air.v_wind_W.head<2>();
   const double speed = std::sqrt(mean.squaredNorm());
   if (!(speed > 0.0 && speed <= kMost))
@@ -303,7 +308,7 @@ void check_wind(const Scenario& scenario, const Places& places) {
   for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id) {
     const Eigen::Vector3d start = make_vehicle_scenario(scenario, id).plant.initial.position;
     const double along = (mean.x() * start.x() + mean.y() * start.y()) / speed;
-    if (!(std::abs(along) <= kReach))
+    if (!(std::abs(along) <= Turbulence::kReach))
       throw places.make_error_at("plant.initial",
                                  "expected vehicle " + std::to_string(id) +
                                      " within 500 m of the origin along the wind, as "
@@ -318,11 +323,7 @@ void check_thrust(const Scenario& scenario, std::size_t rotors, const Places& pl
   for (std::size_t i = 0; i < thrust.failures.size(); ++i) {
     const ThrustFailure& failure = thrust.failures[i];
     const std::string path = "plant.thrust.failures[" + std::to_string(i) + "].";
-    const auto count = static_cast<int>(scenario.vehicles.size());
-    if (failure.vehicle >= count)
-      throw places.make_error_at(path + "vehicle", "expected < the number of vehicles (" +
-                                                       std::to_string(count) + "), got " +
-                                                       std::to_string(failure.vehicle));
+    check_vehicle(failure.vehicle, path + "vehicle", scenario, places);
     if (failure.rotor && rotors == 0)
       throw places.make_error_at(path + "rotor",
                                  "of vehicles with rotors, here they are point masses");

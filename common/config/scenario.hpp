@@ -124,6 +124,8 @@ struct Gust {
 
 /// Dryden turbulence at low altitude, MIL-F-8785C, carried by the mean wind.
 struct Turbulence {
+  static constexpr double kReach = 500.0;  ///< from the origin, along the wind, m
+
   double altitude = 10.0;  ///< above the ground, m, 3 to 300
   double w20 = 0.0;        ///< wind at 20 ft (6.096 m), which sets the intensity, m/s
   std::uint64_t seed = 0;

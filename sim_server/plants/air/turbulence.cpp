@@ -13,6 +13,7 @@ using Eigen::Vector2d, Eigen::Vector3d;
 
 namespace {
 
+constexpr double kReach = config::Turbulence::kReach;
 constexpr double kFoot = 0.3048;  // m
 
 double power(double base, double exponent) { return math::exp(exponent * math::log(base)); }

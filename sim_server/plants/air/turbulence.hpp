@@ -23,15 +23,13 @@ class Turbulence {
   Turbulence(const config::Turbulence& turbulence, const Eigen::Vector3d& v_wind_W);
 
   /// Velocity that it adds at a time (s) and place (m, in W): m/s, in W.
-  /// @throws std::runtime_error at a place that is further than kReach from the origin, along the
-  ///   wind.
+  /// @throws std::runtime_error at a place that is further than its reach from the origin, along
+  ///   the wind.
   Eigen::Vector3d at(double time, const Eigen::Vector3d& p_W);
 
   /// In the axes of the wind, `way` metres into the air that was at the origin at time 0. The ways
-  /// of all calls grow, but for 2 kReach.
+  /// of all calls grow, but for twice the reach.
   Eigen::Vector3d at(double way);
-
-  static constexpr double kReach = 500.0;  ///< m
 
  private:
   /// An output of the filters: one of first order, two of second order.

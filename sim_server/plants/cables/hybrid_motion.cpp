@@ -6,70 +6,16 @@
 #include <stdexcept>
 #include <string>
 
+#include "sim_server/plants/cables/event_search.hpp"
+
 namespace sls::sim::cables {
 namespace {
 
-constexpr double kTimeTolerance = 1e-13;  // of a located event, s
-constexpr double kSimultaneous = 1e-10;   // s: cables that arrive within it meet together
-constexpr double kTouching = 1e-12;       // m, and m/s per 1 + speed: rounding of 0
-constexpr double kRounding = 1e-13;       // of a tension relative to all forces
-constexpr int kMostEvents = 64;           // in a step
-constexpr double kDrift = 1e-11;          // m: of a cable in a step, before eq. (8)
-
-/// The end of an interval of at most kTimeTolerance in which `value` becomes positive: between
-/// `low`, where it is not, and `high`, where it is. Regula falsi (Illinois), every third time
-/// bisection.
-template <class Value>
-double find_crossing(const Value& value, double low, double at_low, double high, double at_high) {
-  int side = 0;
-  for (int i = 0; i < 150 && high - low > kTimeTolerance; ++i) {
-    double time = (low * at_high - high * at_low) / (at_high - at_low);
-    if (i % 3 == 2 || !(time > low && time < high)) time = 0.5 * (low + high);
-    const double found = value(time);
-    if (found > 0.0) {
-      high = time;
-      at_high = found;
-      if (side == 1) at_low *= 0.5;
-      side = 1;
-    } else {
-      low = time;
-      at_low = found;
-      if (side == -1) at_high *= 0.5;
-      side = -1;
-    }
-  }
-  return high;
-}
-
-/// A value and its derivative by time.
-struct Slope {
-  double value, rate;
-};
-
-/// When a value rises above 0, within kTimeTolerance or where it is less than `rounding`. It is
-/// that of `start` at 0, from where it can fall first, and `at_high` > 0 at `high`. Newton's method
-/// from the parabola through these, and bisection where that leaves the interval.
-template <class Find>
-double find_rise(const Find& find, const Slope& start, double high, double at_high,
-                 double rounding) {
-  const double bend = (at_high - start.value - high * start.rate) / (high * high);
-  const double root = start.rate * start.rate - 4.0 * bend * start.value;
-  double time = 0.5 * (std::sqrt(std::max(root, 0.0)) - start.rate) / bend;
-  double low = 0.0;
-  for (int i = 0; i < 150 && high - low > kTimeTolerance; ++i) {
-    if (!(time > low && time < high)) time = 0.5 * (low + high);
-    const Slope at = find(time);
-    if (at.rate > 0.0 && std::abs(at.value) <= rounding) return time;
-    (at.value > std::max(start.value, 0.0) ? high : low) = time;
-    time -= at.value / at.rate;
-  }
-  return high;
-}
-
-/// Of two lines, with value and slope at 0 and at 1, the value where they cross.
-double calc_tangents_crossing(double at_0, double slope_0, double at_1, double slope_1) {
-  return at_0 + slope_0 * (at_1 - at_0 - slope_1) / (slope_0 - slope_1);
-}
+constexpr double kSimultaneous = 1e-10;  // s: cables that arrive within it meet together
+constexpr double kTouching = 1e-12;      // m, and m/s per 1 + speed: rounding of 0
+constexpr double kRounding = 1e-13;      // of a tension relative to all forces
+constexpr int kMostEvents = 64;          // in a step
+constexpr double kDrift = 1e-11;         // m: of a cable in a step, before eq. (8)
 
 /// Whether a cable can move something: not between a vehicle and a load that both stand.
 bool moves(std::size_t cable, const Members& standing) {
@@ -453,8 +399,8 @@ void HybridMotion::integrate(const Actions& actions, double h, Instant& end) {
 void HybridMotion::note_energy_error(const Actions& actions) {
   if (!does_work_vary_ && !(then().drift > kDrift)) return;
   const Motion &start = now().motion, &end = then().motion;
-  double gained = does_work_vary_ ? calc_kinetic_change(system_, start, end) - then().work
-                                  : calc_energy_gain(system_, actions, start, end);
+  const double work = does_work_vary_ ? then().work : calc_held_work(system_, actions, start, end);
+  double gained = calc_kinetic_change(system_, start, end) - work;
   for (const std::size_t i : mode_.stretched) {
     const double before = now().geometry.stretch[i], after = then().geometry.stretch[i];
     gained += 0.5 * system_.stiffness[i] * (after - before) * (after + before);

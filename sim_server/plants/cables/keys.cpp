@@ -3,12 +3,10 @@
 #include <algorithm>
 
 #include "common/config/own_keys.hpp"
-#include "sim_server/plants/air/air.hpp"
 #include "sim_server/plants/cables/hybrid_motion.hpp"
 #include "sim_server/plants/cables/start.hpp"
 #include "sim_server/plants/cables/winch.hpp"
 #include "sim_server/plants/inertia.hpp"
-#include "sim_server/plants/thrust/thrust_source.hpp"
 
 namespace sls::sim {
 namespace {
@@ -18,15 +16,11 @@ std::string show(const Eigen::Vector3d& v) {
          config::to_text(v.z()) + "]";
 }
 
-/// With the signals of cable, stretch, load, winch, release, ground, air and thrust those of so
-/// many rotors fit.
-std::size_t count_most_rotors(const config::Scenario& scenario) {
-  const auto& keys = scenario.plant.own.get<CablesKeys>();
+/// Of cable, load, winch, release and ground, and of cables that stretch.
+std::size_t count_own_signals(const CablesKeys& keys) {
   const bool stretches = std::any_of(keys.cables.begin(), keys.cables.end(),
                                      [](const CableKeys& cable) { return cable.stiffness; });
-  return (model::kMaxNumbers - 14 - 6 - (stretches ? 1 : 0) - Air::count_signals(scenario.plant) -
-          count_thrust_signals(scenario)) /
-         2;
+  return stretches ? 15 : 14;
 }
 
 class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
@@ -65,13 +59,13 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
   double calc_spring_rate(const config::Scenario& scenario) const override {
     const auto& keys = scenario.plant.own.get<CablesKeys>();
     double stiffness = 0.0, damping = 0.0, load_mass = 0.0;
-    for (std::uint32_t i = 0; i < scenario.vehicles.size(); ++i)
-      load_mass += make_vehicle_scenario(scenario, i).vehicle.load_mass;
-    for (std::uint32_t i = 0; i < scenario.vehicles.size(); ++i) {
+    for (const config::VehicleVariant& own : scenario.vehicles)
+      load_mass += own.load_mass.value_or(scenario.vehicle.load_mass);
+    for (std::size_t i = 0; i < scenario.vehicles.size(); ++i) {
       const CableKeys cable = get_cable(keys, i);
       if (!cable.stiffness) continue;
-      double mobility =
-          1.0 / make_vehicle_scenario(scenario, i).vehicle.quad_mass + 1.0 / load_mass;
+      double mobility = 1.0 / scenario.vehicles[i].quad_mass.value_or(scenario.vehicle.quad_mass) +
+                        1.0 / load_mass;
       if (keys.load_inertia)
         mobility += cable.attachment.squaredNorm() / keys.load_inertia->minCoeff();
       stiffness += *cable.stiffness * mobility;
@@ -113,12 +107,8 @@ class CablesOwnKeys : public config::OwnKeys<config::Plant, CablesKeys> {
       throw places.make_error_at(
           "plant.rotor_drag_n_s_m",
           "of point masses; the drag of plant.rotors is drag_constant_n_s2_m of plant.rotor");
-    const std::size_t most = count_most_rotors(scenario);
-    if (keys.airframe->rotors.size() > most)
-      throw places.make_error_at("plant.rotors",
-                                 "expected at most " + std::to_string(most) +
-                                     ", whose signals fit beside those of a cable, got " +
-                                     std::to_string(keys.airframe->rotors.size()));
+    check_rotor_signals(scenario, keys.airframe->rotors.size(), count_own_signals(keys), "a cable",
+                        places);
     check_airframe(*keys.airframe, places);
     for (std::uint32_t id = 0; id < scenario.vehicles.size(); ++id) {
       const model::SlungLoadParameters vehicle = make_vehicle_scenario(scenario, id).vehicle;

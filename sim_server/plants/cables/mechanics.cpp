@@ -201,23 +201,15 @@ double calc_kinetic_change(const System& system, const Motion& from, const Motio
   return change;
 }
 
-double calc_energy_gain(const System& system, const Actions& actions, const Motion& from,
-                        const Motion& to) {
-  const Vector3d v = to.v_WL + from.v_WL;
-  double gain = system.load_mass * (0.5 * model::dot(Vector3d(to.v_WL - from.v_WL), v) -
-                                    system.gravity * (to.p_WL.z() - from.p_WL.z()));
-  if (system.is_rigid)
-    gain += 0.5 * model::dot(Vector3d(to.w_WL_L - from.w_WL_L),
-                             Vector3d(system.inertia_L * (to.w_WL_L + from.w_WL_L)));
+double calc_held_work(const System& system, const Actions& actions, const Motion& from,
+                      const Motion& to) {
+  double work = system.load_mass * system.gravity * (to.p_WL.z() - from.p_WL.z());
   for (std::size_t i = 0; i < system.count; ++i) {
-    const Vehicle &at = from.vehicles[i], &then = to.vehicles[i];
-    const Vector3d way = then.p_W - at.p_W;
-    gain += system.vehicle_mass[i] *
-                (0.5 * model::dot(Vector3d(then.v_W - at.v_W), Vector3d(then.v_W + at.v_W)) -
-                 system.gravity * way.z()) -
-            model::dot(Vector3d(actions.f_Q_W[i] + actions.disturbance_W), way);
+    const Vector3d way = to.vehicles[i].p_W - from.vehicles[i].p_W;
+    work += model::dot(Vector3d(actions.f_Q_W[i] + actions.disturbance_W), way) +
+            system.vehicle_mass[i] * system.gravity * way.z();
   }
-  return gain;
+  return work;
 }
 
 void add_pulls(const System& system, const Geometry& geometry, const Vector& pulls,

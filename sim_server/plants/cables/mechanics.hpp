@@ -127,8 +127,8 @@ double calc_power(const System& system, const Motion& motion, const Motion& rate
 /// How that energy changes from one motion to another, and the work of forces that are held and of
 /// gravity on the way, J.
 double calc_kinetic_change(const System& system, const Motion& from, const Motion& to);
-double calc_energy_gain(const System& system, const Actions& actions, const Motion& from,
-                        const Motion& to);
+double calc_held_work(const System& system, const Actions& actions, const Motion& from,
+                      const Motion& to);
 
 /// Adds to the accelerations `rate` those by the pulls of the `cables`, N: eq. (1). With impulses
 /// (N·s) and a motion it changes the velocities.

@@ -2,8 +2,10 @@
 
 #include "common/config/model_keys.hpp"
 #include "common/config/scenario_reader.hpp"
+#include "sim_server/plants/air/air.hpp"
 #include "sim_server/plants/inertia.hpp"
 #include "sim_server/plants/multirotor/airframe.hpp"
+#include "sim_server/plants/thrust/thrust_source.hpp"
 
 namespace sls::sim {
 
@@ -47,6 +49,18 @@ void check_inertia(const AirframeKeys& keys, double quad_mass, const config::Pla
     throw places.make_error_at("plant.inertia_kg_m2",
                                "expected an inertia > 0 about every axis, of airframe and bodies "
                                "together, got 0");
+}
+
+void check_rotor_signals(const config::Scenario& scenario, std::size_t rotors, std::size_t others,
+                         const std::string& beside, const config::Places& places) {
+  constexpr std::size_t kOfAll = 6;  // attitude set-point, and both thrusts
+  const std::size_t taken =
+      others + kOfAll + Air::count_signals(scenario.plant) + count_thrust_signals(scenario);
+  const std::size_t most = (model::kMaxNumbers - taken) / 2;  // speed and set-point
+  if (rotors > most)
+    throw places.make_error_at("plant.rotors", "expected at most " + std::to_string(most) +
+                                                   ", whose signals fit beside those of " + beside +
+                                                   ", got " + std::to_string(rotors));
 }
 
 void check_lift(const AirframeKeys& keys, double weight, const std::string& lifted,

@@ -63,6 +63,10 @@ config::VehicleShape make_shape(const std::vector<RotorKeys>& rotors,
 void check_airframe(const AirframeKeys& keys, const config::Places& places);
 /// The body of `quad_mass` (kg) has an inertia about every axis.
 void check_inertia(const AirframeKeys& keys, double quad_mass, const config::Places& places);
+/// The signals of `rotors` fit in a measurement beside `others` of the plant, which are those of
+/// `beside`, and those of air and thrust.
+void check_rotor_signals(const config::Scenario& scenario, std::size_t rotors, std::size_t others,
+                         const std::string& beside, const config::Places& places);
 /// The rotors can lift `weight` (N) of `lifted`.
 void check_lift(const AirframeKeys& keys, double weight, const std::string& lifted,
                 const config::Places& places);

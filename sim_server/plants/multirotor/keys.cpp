@@ -3,9 +3,7 @@
 #include <algorithm>
 
 #include "common/config/own_keys.hpp"
-#include "sim_server/plants/air/air.hpp"
 #include "sim_server/plants/inertia.hpp"
-#include "sim_server/plants/thrust/thrust_source.hpp"
 
 namespace sls::sim {
 namespace {
@@ -35,14 +33,7 @@ class MultirotorOwnKeys : public config::OwnKeys<config::Plant, MultirotorKeys> 
 
   void check(const config::Scenario& scenario, const config::Places& places) const override {
     const auto& keys = scenario.plant.own.get<MultirotorKeys>();
-    const std::size_t most = (model::kMaxNumbers - 7 - Air::count_signals(scenario.plant) -
-                              count_thrust_signals(scenario)) /
-                             2;
-    if (keys.rotors.size() > most)
-      throw places.make_error_at("plant.rotors",
-                                 "expected at most " + std::to_string(most) +
-                                     ", whose signals fit beside those of air and thrust, got " +
-                                     std::to_string(keys.rotors.size()));
+    check_rotor_signals(scenario, keys.rotors.size(), 1, "air and thrust", places);
     check_airframe(keys, places);
     check_rod_angles(scenario.plant, places);
     check_pendulum(keys, places);
